@@ -86,6 +86,28 @@ fn roundings_of_reals_count() {
     assert!((rounded - plain - by).abs() < 1e-12, "{plain} {rounded}");
 }
 
+/// A product with a power of two is exact unless it is subnormal, and so is a quotient; a rounding at a power of two counts with the smaller
+/// spacing of the numbers below.
+#[test]
+fn powers_of_two_cost_nothing() {
+    let of = |period: &str| error(&enclose(&program(period, true)).unwrap());
+    for period in ["y = 2*z", "y = -4*z", "y = 0.5*x", "fdiv y, x, 8.0", "fdiv y, z, 0.25"] {
+        assert_eq!(of(period), 0.0, "{period}");
+    }
+    // Subnormal results; results up to 12; and up to 8 and 16, with half of the spacing below.
+    for (period, exponent) in [("y = 0.5*z", -150), ("y = 3*x", -21), ("y = x*z", -22), ("y = x*x", -21)] {
+        let most = 2f64.powi(exponent);
+        assert!((most..1.001 * most).contains(&of(period)), "{period}: {}", of(period));
+    }
+    // Gappa proves the same.
+    let goals = |period: &str| certify(&program(period, true)).unwrap().unwrap().goals();
+    let [(_, doubled)] = &goals("y = 2*z")[..] else { panic!("one operation") };
+    assert!(doubled.ends_with("in [0b0, 0b0] }\n"), "{doubled}");
+    let [(_, halved)] = &goals("y = 0.5*z")[..] else { panic!("one operation") };
+    assert!(halved.contains("in [0b0, 1b-150] }\n$ v"), "{halved}");
+    assert!(halved.ends_with(" in (-1b-125, 1b-125);\n"), "{halved}");
+}
+
 /// A certificate lists each operation; `cargo evidence check certificates` lets Gappa and the checker examine it.
 #[test]
 fn certificates_say_what_they_prove() {

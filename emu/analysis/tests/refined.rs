@@ -281,6 +281,53 @@ fn components_of_a_norm_are_at_most_one() {
     assert!(range.high > 1.5, "{range:?}");
 }
 
+/// Coordinates after a rotation, and after another one: no longer than the vector, which no interval says.
+#[test]
+fn rotations_keep_the_norm() {
+    let first = ".reg c s u v\n c = cos(x)\n s = sin(x)\n u = c*z - 3*s\n v = s*z + 3*c\n";
+    let long = 18f64.sqrt();
+    for (period, most) in [
+        (format!("{first} y = u\n"), long),
+        (format!("{first} y = -v\n"), long),
+        (format!("{first}.reg g h\n g = cos(z)\n h = sin(z)\n y = v*g - h*u\n"), 2f64.sqrt() * long),
+        // Products of their own, in the other order.
+        (
+            ".reg c s u v\n fcos c, x\n fsin s, x\n fmul u, s, z\n fmul v, 3.0, c\n fsub y, u, v\n"
+                .to_owned(),
+            long,
+        ),
+    ] {
+        let (range, error, hazards) = of_period("x = -4, 4\n.range z = -3, 3", &period);
+        assert!(range.magnitude() <= most * (1.0 + 3e-6) && hazards.is_empty(), "{period}: {range:?}");
+        // The turn of the errors, and the roundings.
+        assert!(error < 3.5e-6, "{period}: {error:e}");
+    }
+    // Two sines, a sine and a cosine of different angles, and an angle that changes in between are no rotation.
+    for period in [
+        ".reg s t\n s = sin(x)\n t = sin(x)\n y = s*z + 3*t\n",
+        ".reg s t\n s = sin(x)\n t = cos(z)\n y = s*z + 3*t\n",
+        ".reg s t u\n s = sin(x)\n u = x + 1\n t = cos(u)\n y = s*z + 3*t\n",
+    ] {
+        let (range, ..) = of_period("x = -4, 4\n.range z = -3, 3", period);
+        assert!(range.magnitude() > 5.0, "{period}: {range:?}");
+    }
+}
+
+/// An activation, applied to sums that carry errors and stored: its range is known, and the error grows by its slope, which is at most 1.
+#[test]
+fn stored_activations_keep_their_range_and_slope() {
+    let text = format!(
+        ".schedule on\n.ports latched\n.include <math.s>\n.input x\n.output y\n.array v[1]\n.result v\n.reg u w\n.range x = -8, 8\n{HEAD} u = (3*x + 300) - 300\n w = tanh(u)\n v[1] = w\n y = u\n wait p\n"
+    );
+    let enclosure = held(&with_library(&text, &F3));
+    let ((range, error), (_, of_sum)) = (output(&enclosure, "v"), output(&enclosure, "y"));
+    assert!(range.magnitude() <= 1.0 && error < 4.0 * of_sum, "{range:?} {error:e} {of_sum:e}");
+    // Where the sign is known, the divisor of the function is.
+    let text = text.replace("-8, 8", "0.4, 4");
+    let enclosure = held(&with_library(&text, &F3));
+    assert!(enclosure.hazards.is_empty(), "{enclosure:?}");
+}
+
 #[test]
 fn a_quotient_errs_by_a_share_of_itself() {
     // The divisor spans many orders of magnitude, so the bound must be relative.

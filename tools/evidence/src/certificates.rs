@@ -14,7 +14,7 @@ use takt_isa::T3;
 
 /// Programs whose certificates are checked, with the outputs that they bound at least.
 const PROGRAMS: [(&str, usize); 5] = [
-    ("hybrid/tracking.s", 1),
+    ("hybrid/tracking.s", 40),
     ("examples/foc.s", 5),
     ("examples/pi.s", 1),
     ("examples/statespace.s", 4),

@@ -13,6 +13,8 @@ use std::rc::Rc;
 const ROUNDING: f64 = 1.0 / (1u64 << 50) as f64;
 /// Allowance for underflow in these operations.
 const LEAST: f64 = 1e-300;
+/// Share of a form's radius from which slack gets a symbol.
+const SLACK: f64 = 0.02;
 /// Limit on the terms of a form; beyond it, the smallest are moved to the slack.
 const MAX_TERMS: usize = 1024;
 
@@ -45,6 +47,17 @@ impl Affine {
     /// The form has slack and no symbols: a symbol of its own would let later values be correlated with it.
     pub(super) fn is_free(&self) -> bool {
         self.slack > 0.0 && self.terms.is_empty()
+    }
+
+    /// A good part of the form is slack, as in a product: a symbol of its own lets later values be correlated with it.
+    pub(super) fn is_slack(&self) -> bool {
+        self.is_free() || self.slack.is_finite() && self.slack > SLACK * self.radius()
+    }
+
+    /// The form with a new symbol, larger than all of the form, in place of the slack.
+    pub(super) fn with_slack_as(&self, symbol: u32) -> Affine {
+        let terms = self.terms.iter().copied().chain([(symbol, self.slack)]).collect();
+        Affine { terms, slack: 0.0, ..self.clone() }.short()
     }
 
     /// Form of an interval, with a new symbol.

@@ -14,6 +14,7 @@ use super::interval::Interval;
 use super::node::Meaning;
 use super::number::*;
 use super::operand;
+use super::relative::Relative;
 use super::value::{Offset, Value};
 use super::{FRACTION, LEAST_EXPONENT};
 use std::collections::BTreeSet;
@@ -82,7 +83,7 @@ fn scaled(float: &Number, by: &Number) -> Option<Number> {
         form,
         error: widened(float.error.scale(factor)),
         grid: if tiny { None } else { float.grid.map(|grid| grid + least) },
-        relative: None,
+        relative: (!tiny).then(|| Relative::scaled(float, factor.high)),
     })
 }
 

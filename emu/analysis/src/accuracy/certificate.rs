@@ -9,9 +9,10 @@ use super::affine::Affine;
 use super::enclose::Explorer;
 use super::interval::Interval;
 use super::node::{Made, Meaning, Node};
+use super::number::{INTEGERS, power};
+use super::rounding::{self, is_power};
 use super::states::Place;
-use super::ulp;
-use super::value::Value;
+use super::value::{SMALLEST_NORMAL, Value};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
@@ -19,6 +20,9 @@ use takt_isa::{Program, Type};
 
 /// Checker that goes with every certificate.
 const CHECK: &str = include_str!("check.py");
+
+/// Rules that goals for Gappa spell out; values of others are variables.
+const IN_EXPRESSIONS: [&str; 6] = ["add", "mul", "div", "neg", "sqrt", "steep"];
 
 /// Derivation of the bounds of a period's outputs.
 #[derive(Serialize, Debug, PartialEq)]
@@ -42,6 +46,8 @@ pub struct Promise {
     pub name: String,
     /// Least and largest value.
     pub range: [f64; 2],
+    /// Values are integers; else they are of binary32.
+    pub integer: bool,
 }
 
 /// Step of a derivation: a value, with the rule that encloses it.
@@ -165,15 +171,24 @@ impl Certificate {
         let range = |[low, high]: [f64; 2]| format!("[{}, {}]", exact(low), exact(high));
         let mut text = "@rnd = float<ieee_32, ne>;\n".to_owned();
         for operand in &operands {
-            text += &format!("v{operand} = rnd(u{operand});\n");
+            let format = if self.steps[*operand].rule == "integer" { "int<ne>" } else { "rnd" };
+            text += &format!("v{operand} = {format}(u{operand});\n");
         }
         let given: Vec<String> = operands
             .iter()
             .map(|operand| format!("v{operand} in {}", range(self.steps[*operand].run)))
             .collect();
         let bound = step.rounding.as_ref().map_or(0.0, |rounding| rounding.bound);
+        let hint = match scaled_by(&self.steps, step.of[0]).filter(|_| bound == rounding::LEAST) {
+            // Gappa distinguishes subnormal results from others.
+            Some((operand, by)) => {
+                let at = SMALLEST_NORMAL / by;
+                format!("$ v{operand} in ({}, {});\n", exact(-at), exact(at))
+            }
+            None => String::new(),
+        };
         text + &format!(
-            "r = rnd({expression});\n{{ {} -> r in {} /\\ |r - ({expression})| in {} }}\n",
+            "r = rnd({expression});\n{{ {} -> r in {} /\\ |r - ({expression})| in {} }}\n{hint}",
             given.join(" /\\ "),
             range(step.run),
             range([0.0, bound])
@@ -225,6 +240,19 @@ fn form(affine: &Affine) -> Form {
     Form { center, terms: affine.terms().collect(), slack }
 }
 
+/// For a product of a rounded value with a constant that is a power of two: the value's step, and the magnitude of the power.
+fn scaled_by(steps: &[Step], product: usize) -> Option<(usize, f64)> {
+    let step = steps.get(product).filter(|step| step.rule == "mul")?;
+    let [a, b] = *step.of.as_slice() else { return None };
+    let power = |place: usize| {
+        let [value, _] = steps.get(place).filter(|step| step.rule == "constant")?.run;
+        is_power(value).then_some(value.abs())
+    };
+    let (value, by) =
+        [(a, power(b)), (b, power(a))].into_iter().find_map(|(value, by)| Some((value, by?)))?;
+    (!IN_EXPRESSIONS.contains(&steps.get(value)?.rule)).then_some((value, by))
+}
+
 /// Name of a place in the source.
 fn name(program: &Program, place: Place) -> String {
     match place {
@@ -247,18 +275,20 @@ pub(super) fn derive(explorer: &Explorer<'_>, finals: &[(u32, Place, Rc<Node>)])
     let mut promised = BTreeMap::new();
     for (symbol, place) in &explorer.entered {
         let range = match place {
-            Place::Register(register) => {
-                program.ranges.iter().find(|range| range.register == *register).map(|range| range.ends())
-            }
-            Place::Word(word) => program
-                .array_ranges
+            Place::Register(register) => program
+                .ranges
                 .iter()
-                .find(|range| range.span().contains(word))
-                .map(|range| range.ends()),
+                .find(|range| range.register == *register)
+                .map(|range| (range.ends(), range.ty)),
+            Place::Word(word) => {
+                let range = program.array_ranges.iter().find(|range| range.span().contains(word));
+                range.map(|range| (range.ends(), range.ty))
+            }
         };
-        let Some((low, high)) = range else { continue };
+        let Some(((low, high), ty)) = range else { continue };
         let promise = *promised.entry(*place).or_insert_with(|| {
-            builder.promises.push(Promise { name: name(program, *place), range: [low, high] });
+            let (name, integer) = (name(program, *place), ty != Type::F);
+            builder.promises.push(Promise { name, range: [low, high], integer });
             builder.promises.len() - 1
         });
         builder.entering.insert(*symbol, promise);
@@ -403,7 +433,7 @@ impl Builder<'_> {
         if ulps == 0.0 || sources == 0 {
             return Ok(value);
         }
-        let bound = ulps * ulp(value.run.magnitude());
+        let bound = self.scaled(&value).unwrap_or_else(|| rounding::bound(ulps, value.run));
         if !bound.is_finite() {
             return Err(format!("the result at {source} may be too large"));
         }
@@ -417,6 +447,26 @@ impl Builder<'_> {
         self.steps[known.place].rounding = Some(Rounding { ulps, bound, symbol: self.symbols });
         self.steps[known.place].source = source;
         Ok(self.capped(known))
+    }
+
+    /// The step is an integer from a promise, or a sum of such.
+    fn is_whole(&self, place: usize) -> bool {
+        let step = &self.steps[place];
+        match step.rule {
+            "promise" => step.promise.is_some_and(|promise| self.promises[promise].integer),
+            "integer" => true,
+            "add" | "neg" => step.of.iter().all(|of| self.is_whole(*of)),
+            _ => false,
+        }
+    }
+
+    /// Bound of the rounding of a product with a constant that is a power of two, and of an integer that binary32 has.
+    fn scaled(&self, value: &Known) -> Option<f64> {
+        if self.steps[value.place].rule == "integer" && value.run.magnitude() <= power(24) {
+            return Some(0.0);
+        }
+        let (_, by) = scaled_by(&self.steps, value.place)?;
+        Some(rounding::of_scaled(Interval::point(by), value.run))
     }
 
     /// Replaces an error by the distance of both ranges, where that is narrower.
@@ -439,6 +489,19 @@ impl Builder<'_> {
             Meaning::Abs(of) => {
                 let x = self.meaning(of, made, source)?;
                 Ok(self.magnitude(x))
+            }
+            Meaning::Sign(of) => {
+                let x = self.meaning(of, made, source)?;
+                let error = if x.error.is_zero() { Affine::constant(0.0) } else { centered(2.0) };
+                let known = self.step("sign", &[&x], x.run.sign(), x.exact.sign(), error);
+                Ok(self.capped(known))
+            }
+            Meaning::Integer(of) => {
+                let x = self.meaning(of, made, source)?;
+                if !self.is_whole(x.place) || !x.run.within(INTEGERS) {
+                    return Err(format!("the integer at {source} is neither an input nor a sum of these"));
+                }
+                Ok(self.step("integer", &[&x], x.run, x.exact, x.error.clone()))
             }
             Meaning::Add(of) => {
                 let [a, b] = self.two(of, made, source)?;

@@ -80,6 +80,10 @@ def ranges(rule, x, same):
     if rule == "sat":
         limit = x[1][0]
         return tuple(max(-limit, min(limit, end)) for end in x[0])
+    if rule == "sign":
+        return tuple(Q((end > 0) - (end < 0)) for end in x[0])
+    if rule == "integer":
+        return x[0]
     if rule == "choose":
         return min(x[0][0], x[1][0]), max(x[0][1], x[1][1])
     return {"sin": (Q(-1), Q(1)), "cos": (Q(-1), Q(1)), "decision": (Q(0), Q(1))}[rule]
@@ -94,6 +98,7 @@ class Checker:
     def __init__(self, data):
         self.steps, self.symbols, self.hypotheses, self.goals = [], set(), [], 0
         self.promises = [(promise["name"], pair(promise["range"])) for promise in data["promises"]]
+        self.integers = [promise["integer"] for promise in data["promises"]]
         for place, step in enumerate(data["steps"]):
             step = dict(step, run=pair(step["run"]), exact=pair(step["exact"]), error=Form(step["error"]))
             need(all(0 <= of < place for of in step["of"]), f"step {place} refers to a later one")
@@ -129,7 +134,15 @@ class Checker:
             same = rule == "mul" and step["of"][0] == step["of"][1]
             for kind in ("run", "exact"):
                 good(within(ranges(rule, [operand[kind] for operand in of], same), step[kind]))
+            good(rule != "integer" or self.whole(of[0]) and within(step["run"], (-(2**31), 2**31 - 1)))
             good(self.error(rule, step, [operand["error"] for operand in of], of))
+
+    def whole(self, step):
+        """An integer from a promise, or a sum of such."""
+        rule = step["rule"]
+        if rule in ("add", "neg"):
+            return all(self.whole(self.steps[of]) for of in step["of"])
+        return rule == "integer" or rule == "promise" and self.integers[step["promise"]]
 
     def error(self, rule, step, e, of):
         """The error of a rule's result lies in the step's form."""
@@ -138,6 +151,8 @@ class Checker:
             return error.covers([])
         if rule in ("neg", "add"):
             return error.covers([(-1 if rule == "neg" else 1, form) for form in e])
+        if rule in ("sign", "integer"):
+            return error.covers([], Q(2) if rule == "sign" and e[0].size else Q(0)) and (rule == "sign" or e[0].size == 0)
         if rule in ("abs", "sin", "cos"):
             return error.covers([], e[0].size if rule == "abs" else min(e[0].size, Q(2)))
         if rule == "mul":
@@ -191,9 +206,18 @@ class Checker:
 
         text = expression(step["of"][0])
         ends = lambda low, high: f"[{spelled(low)}, {spelled(high)}]"
-        lines = ["@rnd = float<ieee_32, ne>;"] + [f"v{of} = rnd(u{of});" for of in sorted(operands)] + [f"r = rnd({text});"]
+        lines = ["@rnd = float<ieee_32, ne>;"]
+        for of in sorted(operands):
+            lines.append(f"v{of} = {'int<ne>' if self.steps[of]['rule'] == 'integer' else 'rnd'}(u{of});")
+        lines.append(f"r = rnd({text});")
         given = " /\\ ".join(f"v{of} in {ends(*self.steps[of]['run'])}" for of in sorted(operands))
         lines.append(f"{{ {given} -> r in {ends(*step['run'])} /\\ |r - ({text})| in {ends(Q(0), bound)} }}")
+        if bound == Q(1, 2**150):
+            # Half of a subnormal's unit: the product of a value with a constant power of two, by cases.
+            a, b = self.steps[step["of"][0]]["of"]
+            value, power = (a, b) if self.steps[b]["rule"] == "constant" else (b, a)
+            at = spelled(Q(1, 2**126) / abs(self.steps[power]["run"][0]))
+            lines.append(f"$ v{value} in (-{at}, {at});")
         return "\n".join(lines) + "\n"
 
 

@@ -8,14 +8,18 @@ use super::interval::Interval;
 use super::node::{Made, Meaning, Node};
 use super::number::{Number, Problem, float_grid};
 use super::operand::Operand;
-use super::relation;
+use super::relation::{self, Limit};
 use super::relative::Relative;
+use super::rounding::{self, is_power};
 use super::value::{MAX_PATTERNS, Value};
-use super::{LARGEST_ROUNDED, ROUNDERS, is_rounder, ulp};
+use super::{LARGEST_ROUNDED, ROUNDERS, is_rounder};
 use std::cell::Cell;
 use std::rc::Rc;
 use takt_isa::fp::{Flags, Host};
-use takt_isa::{Instruction, Register, Row, Type, compute, real};
+use takt_isa::{Instruction, Register, Type, compute, real};
+
+/// Factor by which a relation must narrow an error, or a range, to replace terms that are correlated with other values.
+const WORTH: f64 = 1.25;
 
 impl Explorer<'_> {
     /// Result of an operation. A copy, a decided selection and a limit that is not reached return the operand's node, since they are the
@@ -58,8 +62,11 @@ impl Explorer<'_> {
         let values = operands.each_ref().map(|operand| operand.value.clone());
         let (mut value, mut problem) = self.compute(*word, instruction, &values);
         let limit = meaning.as_ref().and_then(|meaning| relation::limit(meaning, operands));
-        if let Some(limit) = limit.filter(|_| matches!(problem, None | Some(Problem::Overflow))) {
-            (value, problem) = (self.limited(*word, &value, limit), None);
+        // A rotation's coordinates may be too large for binary32 themselves.
+        let is_number = |limit: &Limit| limit.magnitude <= f64::from(f32::MAX);
+        let limit = limit.filter(|_| matches!(problem, None | Some(Problem::Overflow))).filter(is_number);
+        if let Some(limit) = limit {
+            (value, problem) = (self.limited(*word, &value, &limit), None);
         }
         let broken = value == Value::Broken;
         let mut node = Node::new(value, made.clone());
@@ -92,21 +99,30 @@ impl Explorer<'_> {
         node
     }
 
-    /// Value whose magnitude a relation of its operands limits, in the run and exactly.
-    fn limited(&mut self, word: u32, value: &Value, limit: f64) -> Value {
-        let range = Interval::new(-limit, limit);
+    /// Value that a relation of its operands limits, in the run and exactly.
+    fn limited(&mut self, word: u32, value: &Value, limit: &Limit) -> Value {
+        let range = Interval::new(-limit.magnitude, limit.magnitude);
         let Value::Float(number) = value else {
             // Two members of a symmetric range differ by at most twice its end.
-            let error = Affine::of(range + range, self.symbol(Some(word)));
+            let most = Interval::new(-limit.error, limit.error);
+            let error = Affine::of((range + range).meet(most), self.symbol(Some(word)));
             let form = Affine::of(range, self.symbol(None));
             let number = Number { actual: range, exact: range, form, error, grid: None, relative: None };
             return Value::Float(Rc::new(number));
         };
         let (actual, exact) = (number.actual.meet(range), number.exact.meet(range));
-        if actual == number.actual && exact == number.exact {
+        let errs = WORTH * limit.error < number.error_range().magnitude();
+        if actual == number.actual && exact == number.exact && !errs {
             return value.clone();
         }
-        let number = Number { actual, exact, ..Number::clone(number) };
+        let mut number = Number { actual, exact, ..Number::clone(number) };
+        if errs {
+            let symbol = self.symbol_of(&number.error, word);
+            number.error = Affine::of(Interval::new(-limit.error, limit.error), symbol);
+        }
+        if number.form.radius() > WORTH * exact.radius() {
+            number.form = Affine::of(exact, self.symbol(None));
+        }
         Value::Float(Rc::new(number.capped(|error| self.symbol_of(error, word))))
     }
 
@@ -154,7 +170,7 @@ impl Explorer<'_> {
     /// values stay as they are: a copy is the same number.
     pub(super) fn own(&mut self, word: u32, value: Value) -> Value {
         match value {
-            Value::Float(number) if number.form.is_free() || number.is_loose() => {
+            Value::Float(number) if number.form.is_slack() || number.is_loose() => {
                 let number = Number::clone(&number).capped(|error| self.symbol_of(error, word));
                 Value::Float(Rc::new(self.correlated(number)))
             }
@@ -172,10 +188,14 @@ impl Explorer<'_> {
     }
 
     fn correlated(&mut self, number: Number) -> Number {
-        if !number.form.is_free() {
+        if !number.form.is_slack() {
             return number;
         }
-        let form = Affine::of(number.exact, self.symbol(None));
+        let symbol = self.symbol(None);
+        let form = match number.form.is_free() {
+            true => Affine::of(number.exact, symbol),
+            false => number.form.with_slack_as(symbol),
+        };
         Number { form, ..number }
     }
 
@@ -192,12 +212,15 @@ impl Explorer<'_> {
         let rounder = |register: &Register| self.fixed.get(register).is_some_and(|bits| is_rounder(*bits));
         let terms = terms.filter(|_| instruction.reads().iter().any(rounder));
         let (may_decide, may_round) = terms.map_or((false, true), decides);
-        let row = instruction.op.row();
         let result = if !may_decide {
-            self.rounded(word, row, number, operands)?
+            self.rounded(word, instruction, number, operands)?
         } else {
             let decided = bits::nearest(&number, self.symbol(None));
-            if may_round { decided.join(&self.rounded(word, row, number, operands)?) } else { decided }
+            if may_round {
+                decided.join(&self.rounded(word, instruction, number, operands)?)
+            } else {
+                decided
+            }
         };
         Ok(Value::Float(Rc::new(result)))
     }
@@ -206,10 +229,11 @@ impl Explorer<'_> {
     fn rounded(
         &mut self,
         word: u32,
-        row: &Row,
+        instruction: &Instruction,
         mut number: Number,
         operands: &[Value; 3],
     ) -> Result<Number, Problem> {
+        let row = instruction.op.row();
         let actual = number.actual;
         let bound = row.ulp.unwrap_or(0.0);
         let magnitude = actual.magnitude();
@@ -218,7 +242,12 @@ impl Explorer<'_> {
         if bound == 0.0 || number.grid.is_some_and(fits) {
             return if magnitude <= largest { Ok(number) } else { Err(Problem::Overflow) };
         }
-        let local = bound * ulp(magnitude);
+        let scaled = scaled_by(instruction, operands).map(|power| rounding::of_scaled(power, actual));
+        if scaled == Some(0.0) {
+            number.grid = number.grid.max(float_grid(actual));
+            return if magnitude <= largest { Ok(number) } else { Err(Problem::Overflow) };
+        }
+        let local = scaled.unwrap_or_else(|| rounding::bound(bound, actual));
         // Written so that a NaN does not fit.
         let fits = magnitude + local <= largest && number.error.range().is_finite();
         if !fits {
@@ -236,7 +265,10 @@ impl Explorer<'_> {
             return Ok(number);
         }
         let symbol = self.symbol(Some(word));
-        number.relative = Some(Relative::of(&number).rounded(bound));
+        number.relative = Some(match scaled {
+            Some(by) => Relative::of(&number).widened(by),
+            None => Relative::of(&number).rounded(bound),
+        });
         number.error = number.error.with(symbol, local);
         number.actual = match bound == 0.5 {
             // Rounding to nearest is monotonic.
@@ -246,6 +278,36 @@ impl Explorer<'_> {
         number.grid = number.grid.max(float_grid(number.actual));
         Ok(number.capped(|error| self.symbol_of(error, word)))
     }
+}
+
+/// Magnitudes of the power of two by which a product or quotient scales its other operand in every run; `None` for other operations.
+fn scaled_by(instruction: &Instruction, operands: &[Value; 3]) -> Option<Interval> {
+    let power = |of: &Meaning| match of {
+        Meaning::Source(place) => powers(&operands[*place]),
+        _ => None,
+    };
+    match Meaning::of(instruction)? {
+        Meaning::Mul(of) => power(&of[0]).or_else(|| power(&of[1])),
+        Meaning::Div(of) => power(&of[1]).map(|power| Interval::point(1.0) / power),
+        _ => None,
+    }
+}
+
+/// Magnitudes of an operand that is a power of two in every run.
+fn powers(value: &Value) -> Option<Interval> {
+    let magnitudes = match value {
+        Value::Patterns(patterns) => {
+            let values = patterns.iter().map(|bits| f64::from(f32::from_bits(*bits)));
+            values
+                .map(|value| is_power(value).then(|| Interval::point(value.abs())))
+                .collect::<Option<Vec<_>>>()?
+        }
+        Value::Float(number) if is_power(number.actual.low) && number.actual.low == number.actual.high => {
+            vec![number.actual.abs()]
+        }
+        _ => return None,
+    };
+    magnitudes.into_iter().reduce(Interval::hull)
 }
 
 /// Operand that a minimum or maximum takes in every run, if there is one.

@@ -6,6 +6,7 @@
 //! instructions gives the results (`compute.rs`), and their `ulp` the rounding error. Conditions narrow what was computed before
 //! (`refine.rs`).
 
+use super::affine::Affine;
 use super::assume::View;
 use super::certificate::{self, Certificate};
 use super::enclosure::{Enclosure, Hazard, OutputBound, OutputPlace, Relied};
@@ -13,6 +14,7 @@ use super::interval::Interval;
 use super::memory::array_starts;
 use super::node::{Made, Node};
 use super::number::{Number, Problem};
+use super::refine::constrained;
 use super::states::{Place, is_shown, is_word_shown};
 use super::value::Value;
 use super::{fixed, kept, preset};
@@ -121,7 +123,7 @@ fn explored<'p>(
         left: Vec::new(),
         branches: false,
         real_inputs: reals.inputs,
-        real_constants: reals.constants.iter().map(|value| ((*value as f32).to_bits(), *value)).collect(),
+        real_constants: real_constants(&reals.constants),
         symbols: Vec::new(),
         found: Found::default(),
         once: true,
@@ -170,12 +172,24 @@ fn explored<'p>(
     Ok(explorer)
 }
 
+/// Real numbers by the bits of the constants that stand for them: several may round to one binary32.
+fn real_constants(reals: &[f64]) -> HashMap<u32, Interval> {
+    let mut found: HashMap<u32, Interval> = HashMap::new();
+    for real in reals {
+        let at = Interval::point(*real);
+        found.entry((*real as f32).to_bits()).and_modify(|known| *known = known.hull(at)).or_insert(at);
+    }
+    found
+}
+
 /// Abstract state at a point of the program: everything that an instruction may read.
 #[derive(Clone)]
 pub(super) struct State {
     pub(super) registers: BTreeMap<Register, Rc<Node>>,
     /// States not proved to be in their range at the first period's start, and not written since.
     unshown: BTreeSet<Register>,
+    /// Forms that are not positive, by assumptions on the way.
+    constraints: Vec<Affine>,
     /// Data words written in this period.
     pub(super) memory: BTreeMap<u32, Rc<Node>>,
     /// Return addresses, and the iteration counts of active loops.
@@ -252,7 +266,7 @@ pub(super) struct Explorer<'p> {
     /// The rounding of inputs counts as an error.
     pub(super) real_inputs: bool,
     /// Real numbers that constants stand for, by the constants' bits.
-    real_constants: HashMap<u32, f64>,
+    real_constants: HashMap<u32, Interval>,
     pub(super) found: Found,
     /// The section from reset is followed, in which data memory holds what the loader put there.
     pub(super) once: bool,
@@ -306,7 +320,9 @@ impl Explorer<'_> {
     pub(super) fn constant(&self, bits: u32) -> Value {
         let value = f64::from(f32::from_bits(bits));
         match self.real_constants.get(&bits) {
-            Some(real) if *real != value => Value::Float(Rc::new(Number::rounded_constant(value, *real))),
+            Some(real) if *real != Interval::point(value) => {
+                Value::Float(Rc::new(Number::rounded_constant(value, *real)))
+            }
             _ => Value::bits(bits),
         }
     }
@@ -347,7 +363,14 @@ impl Explorer<'_> {
                 unshown.insert(range.register);
             }
         }
-        State { registers, unshown, memory: BTreeMap::new(), calls: Vec::new(), turns: BTreeMap::new() }
+        State {
+            registers,
+            unshown,
+            constraints: Vec::new(),
+            memory: BTreeMap::new(),
+            calls: Vec::new(),
+            turns: BTreeMap::new(),
+        }
     }
 
     /// Gives new values to the input ports that a bundle reads: unless ports are latched, the host may have set them since the last read.
@@ -540,6 +563,7 @@ impl Explorer<'_> {
                 }
                 known.registers.retain(|register, _| state.registers.contains_key(register));
                 known.unshown.extend(&state.unshown);
+                known.constraints.retain(|constraint| state.constraints.contains(constraint));
                 let words: BTreeSet<u32> = known.memory.keys().chain(state.memory.keys()).copied().collect();
                 for word in words {
                     let mut initial = || self.initial_word(word);
@@ -654,6 +678,7 @@ impl Explorer<'_> {
         for node in state.registers.values_mut().chain(state.memory.values_mut()) {
             *node = self.under(node, &mut scene);
         }
+        scene.add_to(&mut state.constraints);
         true
     }
 
@@ -676,7 +701,10 @@ impl Explorer<'_> {
         }
         self.found.operations += u64::from(instruction.effect() != Effect::Nothing);
         Ok(match instruction.effect() {
-            Effect::Compute => Some(self.apply(&Made { word, instruction: *instruction, operands })),
+            Effect::Compute => {
+                let node = self.apply(&Made { word, instruction: *instruction, operands });
+                Some(constrained(node, &state.constraints))
+            }
             Effect::Immediate => Some(Node::leaf(self.constant(instruction.constant))),
             Effect::Load => {
                 let words = self.addresses(word, instruction, &operands[0].value, (address, &state.calls))?;
@@ -684,7 +712,8 @@ impl Explorer<'_> {
             }
             Effect::Store => {
                 let words = self.addresses(word, instruction, &operands[0].value, (address, &state.calls))?;
-                self.store(state, words, &operands[1]);
+                let value = self.settled(&operands[1]);
+                self.store(state, words, &value);
                 None
             }
             Effect::ReadFlags => Some(Node::leaf(Value::Any)),

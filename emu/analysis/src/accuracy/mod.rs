@@ -26,6 +26,7 @@ mod probe;
 mod refine;
 mod relation;
 mod relative;
+mod rounding;
 mod shadow;
 mod states;
 mod value;

@@ -137,6 +137,7 @@ pub(super) enum Meaning {
     Source(usize),
     Neg(Box<Meaning>),
     Abs(Box<Meaning>),
+    Sign(Box<Meaning>),
     Sqrt(Box<Meaning>),
     /// Bits of the operand as a signed integer.
     Integer(Box<Meaning>),
@@ -228,7 +229,7 @@ impl Real for Meaning {
     }
 
     fn sign(self) -> Meaning {
-        Meaning::Other
+        Meaning::Sign(Box::new(self))
     }
 
     fn minimum(self, other: Meaning) -> Meaning {

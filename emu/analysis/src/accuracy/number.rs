@@ -62,10 +62,10 @@ impl Number {
         Number { actual: range, exact: range, form: Affine::of(range, symbol), error, grid, relative: None }
     }
 
-    /// Constant that stands for a real number, which binary64 has to within four ulps.
-    pub(super) fn rounded_constant(value: f64, real: f64) -> Number {
-        let slack = real.abs() * (4.0 * f64::EPSILON);
-        let exact = Interval::point(real).widened(slack);
+    /// Constant that stands for a real number in an interval, whose ends binary64 has to within four ulps.
+    pub(super) fn rounded_constant(value: f64, real: Interval) -> Number {
+        let slack = real.magnitude() * (4.0 * f64::EPSILON);
+        let exact = real.widened(slack);
         let error = Interval::point(value) - exact;
         Number {
             actual: Interval::point(value),

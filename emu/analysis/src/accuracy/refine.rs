@@ -6,6 +6,7 @@ use super::affine::Affine;
 use super::assume::{Context, Impossible, View, both};
 use super::enclose::Explorer;
 use super::interval::Interval;
+use super::is_rounder;
 use super::node::{Made, Meaning, Node};
 use super::number::{Number, SIGN};
 use super::relative::Relative;
@@ -20,8 +21,14 @@ const MAX_NESTED: u32 = 3;
 const MAX_CASES: u32 = 6;
 /// Limit on the divisions of a range.
 const MAX_DIVISIONS: u32 = 128;
-/// Factor by which parts must narrow a value or an error to replace terms that are correlated with other values.
+/// Limit on the constraints that assumptions leave for later values.
+const MAX_CONSTRAINTS: usize = 16;
+/// Limit on the operations of a function whose argument's range is divided.
+const MAX_BETWEEN: usize = 512;
+/// Factor by which parts must narrow a value or an error to replace terms that are correlated with other values; and the same where the value
+/// is stored, as the result of a function.
 const WORTH: f64 = 4.0;
+const WORTH_STORED: f64 = 1.25;
 /// Limit on the operations that are evaluated again for the cases of one result.
 const MAX_AGAIN: usize = 1 << 14;
 
@@ -32,6 +39,33 @@ pub(super) struct Scene {
     replaced: BTreeMap<u32, (f64, f64, u32)>,
     /// Nodes by address, each with its replacement under the assumptions.
     nodes: HashMap<*const Node, (Rc<Node>, Rc<Node>)>,
+}
+
+impl Scene {
+    /// A form in the symbols of the scene.
+    fn form(&self, form: &Affine) -> Affine {
+        form.replaced(&self.replaced).unwrap_or_else(|| form.clone())
+    }
+
+    /// Forms that are not positive under the assumptions.
+    fn constraints(&self) -> Vec<Affine> {
+        self.context.constraints.iter().map(|constraint| self.form(constraint)).collect()
+    }
+
+    /// Adds the scene's constraints to those that hold already.
+    pub(super) fn add_to(&self, known: &mut Vec<Affine>) {
+        *known = known.iter().map(|constraint| self.form(constraint)).chain(self.constraints()).collect();
+        known.truncate(MAX_CONSTRAINTS);
+    }
+}
+
+/// Node whose range constraints narrow.
+pub(super) fn constrained(node: Rc<Node>, constraints: &[Affine]) -> Rc<Node> {
+    if constraints.is_empty() {
+        return node;
+    }
+    let value = tightened(&node.value, constraints);
+    if value == node.value { node } else { node.narrowed(value, node.made.clone()) }
 }
 
 /// Value that depends on one other value and on constants.
@@ -172,7 +206,7 @@ impl Explorer<'_> {
         for (taken, holds) in [(yes, true), (no, false)] {
             if let Some(mut scene) = self.scene(|context| context.decide(condition, holds)) {
                 let node = self.under(taken, &mut scene);
-                let value = tightened(&node.value, &scene);
+                let value = tightened(&node.value, &scene.constraints());
                 joined = Some(joined.map_or_else(|| value.clone(), |known| known.join(&value)));
             }
         }
@@ -196,6 +230,10 @@ impl Explorer<'_> {
     /// Value of a node by dividing the range of the last value on which all of it depends: parts in which the result is largest, or errs
     /// most, are divided further.
     pub(super) fn in_parts(&mut self, node: &Rc<Node>) -> Value {
+        self.in_parts_worth(node, WORTH)
+    }
+
+    fn in_parts_worth(&mut self, node: &Rc<Node>, worth: f64) -> Value {
         let Some(waist) = waist(node) else { return node.value.clone() };
         let Some((function, key)) = self.function(node, &waist) else { return node.value.clone() };
         let known = match self.divided.get(&key) {
@@ -211,17 +249,37 @@ impl Explorer<'_> {
         let mut terms = Affine::constant(0.0);
         if let Value::Float(whole) = &node.value {
             // Narrower ranges cost the correlations: a small gain is not worth it.
-            if whole.form.radius() < WORTH * parts.form.radius() {
+            if whole.form.radius() < worth * parts.form.radius() {
                 number.form = whole.form.clone();
             }
             terms = whole.error.clone();
         }
-        if matches!(node.value, Value::Float(_)) && terms.radius() < WORTH * parts.error.radius() {
+        if matches!(node.value, Value::Float(_)) && terms.radius() < worth * parts.error.radius() {
             number.error = terms;
         } else if !parts.error.is_zero() {
             number.error = Affine::of(parts.error.range(), self.symbol_of(&terms, made.word));
         }
         both(&node.value, Value::Float(Rc::new(number)))
+    }
+
+    /// Node of a value that is stored: if it is a function of one value, with selections or limits, from parts of that value's range. So
+    /// are elements of vectors that an activation was applied to.
+    pub(super) fn settled(&mut self, node: &Rc<Node>) -> Rc<Node> {
+        let Some(made) = node.made.as_ref().filter(|_| self.quiet == 0 && !self.plain) else {
+            return Rc::clone(node);
+        };
+        let word = made.word;
+        let is_open = waist(node).is_some_and(|waist| {
+            let (mut seen, mut questions) = (HashSet::from([Rc::as_ptr(&waist)]), Vec::new());
+            cases(node, &mut seen, &mut questions);
+            !questions.is_empty()
+        });
+        let value = if is_open { self.in_parts_worth(node, WORTH_STORED) } else { node.value.clone() };
+        if value == node.value {
+            return Rc::clone(node);
+        }
+        let value = self.own(word, value);
+        Node::new(value, made.clone())
     }
 
     /// A node as a function of one value: a copy of the operations between them, and a key that is the same for all copies with the same
@@ -299,14 +357,15 @@ impl Explorer<'_> {
                 return Some(node.value.clone());
             }
             let Some(value) = self.split(&under, most - 1) else { continue };
-            let value = tightened(&value, &scene);
+            let value = tightened(&value, &scene.constraints());
             joined = Some(joined.map_or_else(|| value.clone(), |known| known.join(&value)));
         }
         joined
     }
 }
 
-/// Nearest value that all other dependences of a node pass through; `None` without one, or if it is an operand that is used once.
+/// Nearest value that all other dependences of a node pass through; `None` without one, if it is an operand that is used once, or behind more
+/// than [`MAX_BETWEEN`] operations.
 fn waist(node: &Rc<Node>) -> Option<Rc<Node>> {
     let mut open = BTreeMap::from([((node.depth(), Rc::as_ptr(node)), Rc::clone(node))]);
     let mut steps = 0;
@@ -315,6 +374,9 @@ fn waist(node: &Rc<Node>) -> Option<Rc<Node>> {
             return Some(next);
         }
         steps += 1;
+        if steps > MAX_BETWEEN {
+            return None;
+        }
         for operand in &next.made.as_ref()?.operands {
             if !is_constant(operand) {
                 open.insert((operand.depth(), Rc::as_ptr(operand)), Rc::clone(operand));
@@ -410,6 +472,23 @@ fn questions_of(meaning: &Meaning, made: &Made) -> Vec<Case> {
             let limits = limit(&of[0], &of[1]).into_iter();
             limits.flat_map(|(node, at)| [at, -at].map(|at| cut(&node, at))).flatten().collect()
         }
+        // Rounding to an integer by a sum: between two integers, if the operand is near no others.
+        Meaning::Add(of) => {
+            let is_rounder = |meaning: &Meaning| {
+                let range = node(meaning).and_then(range);
+                range.is_some_and(|range| range.low == range.high && is_rounder((range.low as f32).to_bits()))
+            };
+            let rounded = if is_rounder(&of[1]) { &of[0] } else { &of[1] };
+            let Some(node) = node(rounded).filter(|_| is_rounder(&of[0]) != is_rounder(&of[1])) else {
+                return Vec::new();
+            };
+            let between = range(node).map(|range| (range.low.round() + 0.5, range.high - range.low));
+            let near = between.filter(|(_, width)| *width <= 2.0);
+            near.into_iter()
+                .flat_map(|(at, _)| [at - 1.0, at, at + 1.0])
+                .filter_map(|at| cut(node, at))
+                .collect()
+        }
         Meaning::Abs(of) => node(of).and_then(|node| cut(node, 0.0)).into_iter().collect(),
         Meaning::Bitwise(Bitwise::And, of) => {
             let (Some(a), Some(b)) = (node(&of[0]), node(&of[1])) else { return Vec::new() };
@@ -449,14 +528,13 @@ fn replaced(value: &Value, by: &BTreeMap<u32, (f64, f64, u32)>) -> Option<Value>
     }
 }
 
-/// Value with ranges that the constraints of a scene narrow: for a form `f` and a constraint `g` ≤ 0, f ≤ f - λ·g for each λ ≥ 0.
-fn tightened(value: &Value, scene: &Scene) -> Value {
+/// Value with ranges that constraints narrow: for a form `f` and a constraint `g` ≤ 0, f ≤ f - λ·g for each λ ≥ 0.
+fn tightened(value: &Value, constraints: &[Affine]) -> Value {
     let Value::Float(number) = value else { return value.clone() };
     let (mut exact, mut error) = (number.exact, number.error_range());
-    for constraint in &scene.context.constraints {
-        let constraint = constraint.replaced(&scene.replaced).unwrap_or_else(|| constraint.clone());
-        exact = exact.meet(lagrange(&number.form, &constraint));
-        error = error.meet(lagrange(&number.error, &constraint));
+    for constraint in constraints {
+        exact = exact.meet(lagrange(&number.form, constraint));
+        error = error.meet(lagrange(&number.error, constraint));
     }
     let actual = number.actual.meet(exact + error);
     let exact = if number.error.is_zero() { exact.meet(actual) } else { exact };

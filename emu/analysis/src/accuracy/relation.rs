@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Relations between values that intervals and linear forms do not capture: a component is at most the norm that it is part of.
+//! Relations between values that intervals and linear forms do not capture: a component is at most the norm that it is part of, and a rotation
+//! keeps the norm.
 
 use super::interval::Interval;
 use super::node::{Meaning, Node};
+use super::number::Number;
+use super::rounding;
 use super::value::Value;
 use std::rc::Rc;
+use takt_isa::Op;
 
 /// Limit on the depth of the search for a relation, in operations.
 const MAX_DEPTH: u32 = 24;
@@ -29,11 +33,25 @@ fn made(node: &Rc<Node>) -> Option<(Meaning, &[Rc<Node>; 3])> {
     Some((Meaning::of(&made.instruction)?, &made.operands))
 }
 
-/// Limit on the magnitude of a result, in the run and exactly: of a component over its norm, or times the norm's inverse.
+/// Limits on a result in the run and exactly.
+pub(super) struct Limit {
+    pub(super) magnitude: f64,
+    /// Limit on the error; may be infinite.
+    pub(super) error: f64,
+}
+
+/// Limits of a component over its norm, or times the norm's inverse; and of a coordinate after a rotation.
+pub(super) fn limit(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> Option<Limit> {
+    ratio(meaning, operands)
+        .map(|magnitude| Limit { magnitude, error: f64::INFINITY })
+        .or_else(|| Rotation::of(meaning, operands)?.limit())
+}
+
+/// Limit on the magnitude of a component over its norm.
 ///
 /// In the run the quotient of a component and its norm is at most 1, too: the square root of a rounded square is the number itself (Boldo,
 /// 2015), and rounding is monotonic. The inverse is at most half an ulp too large, and a product of at most 1 + 2⁻²⁴ is rounded to 1.
-pub(super) fn limit(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> Option<f64> {
+fn ratio(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> Option<f64> {
     match meaning {
         Meaning::Div(of) => {
             let (a, b) = (source(&of[0], operands)?, source(&of[1], operands)?);
@@ -50,6 +68,106 @@ pub(super) fn limit(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> Option<f64> 
             by_inverse(a, b).or_else(|| by_inverse(b, a))
         }
         _ => None,
+    }
+}
+
+/// Term of a sum that is a product.
+struct Product<'n> {
+    factors: [&'n Rc<Node>; 2],
+    negative: bool,
+    /// Node of the product, if it is rounded by itself.
+    rounded: Option<&'n Rc<Node>>,
+}
+
+/// Product that a part of a meaning is, or the operation that gave its source.
+fn product<'n>(meaning: &Meaning, operands: &'n [Rc<Node>; 3]) -> Option<Product<'n>> {
+    match meaning {
+        Meaning::Neg(of) => {
+            let product = product(of, operands)?;
+            Some(Product { negative: !product.negative, ..product })
+        }
+        Meaning::Mul(of) => Some(Product {
+            factors: [source(&of[0], operands)?, source(&of[1], operands)?],
+            negative: false,
+            rounded: None,
+        }),
+        Meaning::Source(place) => {
+            let node = &operands[*place];
+            let (meaning, operands) = made(node)?;
+            let product = match meaning {
+                Meaning::Neg(_) | Meaning::Mul(_) => product(&meaning, operands)?,
+                _ => return None,
+            };
+            Some(Product { rounded: product.rounded.or(Some(node)), ..product })
+        }
+        _ => None,
+    }
+}
+
+/// The angle of a sine or cosine, and whether it is a sine.
+fn angle(node: &Rc<Node>) -> Option<(&Rc<Node>, bool)> {
+    let made = node.made.as_ref()?;
+    match made.instruction.op {
+        Op::fsin => Some((&made.operands[0], true)),
+        Op::fcos => Some((&made.operands[0], false)),
+        _ => None,
+    }
+}
+
+/// Coordinate after a rotation: ±x·cos φ ± y·sin φ.
+struct Rotation<'n> {
+    /// Cosine and sine.
+    trig: [&'n Rc<Node>; 2],
+    /// Coordinates before the rotation, that of the cosine first.
+    before: [&'n Rc<Node>; 2],
+    /// Products that are rounded by themselves.
+    rounded: Vec<&'n Rc<Node>>,
+}
+
+/// Factor that covers the roundings of a cosine, a sine, two products and their sum: a few units of 2⁻²³.
+const ROUNDED: f64 = 1.0 + 1.0 / (1u32 << 20) as f64;
+
+impl<'n> Rotation<'n> {
+    fn of(meaning: &Meaning, operands: &'n [Rc<Node>; 3]) -> Option<Rotation<'n>> {
+        let Meaning::Add(of) = meaning else { return None };
+        let terms = [product(&of[0], operands)?, product(&of[1], operands)?];
+        // Each factor that is a sine or cosine, with the other one.
+        let ways = terms.each_ref().map(|term| {
+            let [a, b] = term.factors;
+            [(a, b), (b, a)].into_iter().filter_map(|(trig, other)| Some((angle(trig)?, trig, other)))
+        });
+        let [first, second] = ways.map(Iterator::collect::<Vec<_>>);
+        let pairs = first.iter().flat_map(|one| second.iter().map(move |other| (one, other)));
+        let ((one, trig, x), (_, other_trig, y)) =
+            pairs.into_iter().find(|(one, other)| Rc::ptr_eq(one.0.0, other.0.0) && one.0.1 != other.0.1)?;
+        let is_sine = one.1;
+        let swap = |pair: [&'n Rc<Node>; 2]| if is_sine { [pair[1], pair[0]] } else { pair };
+        Some(Rotation {
+            trig: swap([trig, other_trig]),
+            before: swap([x, y]),
+            rounded: terms.iter().filter_map(|term| term.rounded).collect(),
+        })
+    }
+
+    /// |x·cos φ + y·sin φ| ≤ √(x² + y²). The error is that of the same rotation applied to the errors of x and y, with the errors of
+    /// cosine and sine times the coordinates in the run, and the roundings.
+    fn limit(&self) -> Option<Limit> {
+        let number = |node: &Rc<Node>| node.value.float().ok();
+        let [x, y] = self.before.map(number);
+        let [cos, sin] = self.trig.map(number);
+        let (x, y, cos, sin) = (x?, y?, cos?, sin?);
+        let norm = |a: f64, b: f64| (Interval::point(a).square() + Interval::point(b).square()).sqrt().high;
+        let size = |of: fn(&Number) -> Interval| norm(of(&x).magnitude(), of(&y).magnitude());
+        let magnitude = size(|number| number.actual).max(size(|number| number.exact)) * ROUNDED;
+        let magnitude = magnitude + f64::from(f32::MIN_POSITIVE);
+        let by_trig = cos.error_range().magnitude() * x.actual.magnitude()
+            + sin.error_range().magnitude() * y.actual.magnitude();
+        let products = self.rounded.iter().filter_map(|node| number(node));
+        let roundings: f64 = products.map(|product| rounding::bound(0.5, product.actual)).sum();
+        let sum = rounding::bound(0.5, Interval::new(-magnitude, magnitude));
+        let error = (size(Number::error_range) + by_trig + roundings + sum) * ROUNDED;
+        let is_known = self.rounded.iter().all(|node| number(node).is_some());
+        Some(Limit { magnitude, error: if is_known { error } else { f64::INFINITY } })
     }
 }
 
@@ -132,7 +250,8 @@ pub(super) fn is_steep(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> bool {
     };
     match meaning {
         Meaning::Div(of) => {
-            let depends = source(&of[0], operands).is_some_and(|node| node.made.is_some());
+            let depends =
+                of.iter().any(|part| source(part, operands).is_some_and(|node| node.made.is_some()));
             depends
                 && range(&of[1]).is_some_and(|divisor| {
                     !divisor.contains(0.0) && divisor.magnitude() > STEEP * divisor.abs().low

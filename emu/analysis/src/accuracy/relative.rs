@@ -20,7 +20,9 @@ impl Relative {
     pub(super) const EXACT: Relative = Relative { share: 0.0, rest: 0.0 };
 
     fn new(share: f64, rest: f64) -> Relative {
-        Relative { share: share * ROUNDING, rest: rest * ROUNDING }
+        // Products of infinity and zero bound nothing.
+        let most = |value: f64| if value.is_nan() { f64::INFINITY } else { value * ROUNDING };
+        Relative { share: most(share), rest: most(rest) }
     }
 
     /// Bound on the magnitude of the error of a value in this range.
@@ -57,11 +59,28 @@ impl Relative {
         Relative::new(self.share + by * (1.0 + self.share), self.rest * (1.0 + by) + ulps * LEAST)
     }
 
-    /// Sum of terms that do not cancel.
+    /// Bound after an error of at most this magnitude.
+    pub(super) fn widened(self, by: f64) -> Relative {
+        Relative::new(self.share, self.rest + by)
+    }
+
+    /// Number times a power of two, of at most this magnitude.
+    pub(super) fn scaled(a: &Number, most: f64) -> Relative {
+        let (relative, least) = (Relative::of(a), a.exact.abs().low);
+        if least > 0.0 { relative.whole(least) } else { Relative::new(relative.share, relative.rest * most) }
+    }
+
+    /// Sum of two terms: if they may cancel, the larger one is at most the smaller one away from the sum.
     pub(super) fn sum(a: &Number, b: &Number) -> Option<Relative> {
         let same = a.exact.low.min(b.exact.low) >= 0.0 || a.exact.high.max(b.exact.high) <= 0.0;
         let (x, y) = (Relative::of(a), Relative::of(b));
-        same.then(|| Relative::new(x.share.max(y.share), x.rest + y.rest))
+        if same {
+            return Some(Relative::new(x.share.max(y.share), x.rest + y.rest));
+        }
+        let (sizes, shares) = ((a.exact.magnitude(), b.exact.magnitude()), (x.share, y.share));
+        let (small, (of_large, of_small)) =
+            if sizes.0 < sizes.1 { (sizes.0, (shares.1, shares.0)) } else { (sizes.1, shares) };
+        Some(Relative::new(of_large, x.rest + y.rest + (of_large + of_small) * small))
     }
 
     pub(super) fn product(a: &Number, b: &Number) -> Option<Relative> {

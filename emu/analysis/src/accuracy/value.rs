@@ -10,7 +10,7 @@ use std::rc::Rc;
 /// Limit on the bit patterns listed for a value; beyond it, the value is [`Value::Any`].
 pub(super) const MAX_PATTERNS: usize = 1024;
 /// Smallest normal binary32.
-const SMALLEST_NORMAL: f64 = f32::MIN_POSITIVE as f64;
+pub(super) const SMALLEST_NORMAL: f64 = f32::MIN_POSITIVE as f64;
 
 /// Abstract value: a set of values that a register may hold.
 #[derive(Clone, Debug, PartialEq)]
