@@ -124,6 +124,8 @@ pub struct AssembledProgram {
     pub sources: Arc<Sources>,
     /// Named constants and their values, in the order of the source.
     pub constants: Vec<(String, expr::Value)>,
+    /// Real numbers that constants of the program stand for, where rounding to binary32 changes them.
+    pub reals: Vec<f64>,
     /// A report of each block that the scheduler packed, in order.
     pub blocks: Vec<schedule::BlockReport>,
     /// Counted loops of the source with their final form, in order.
@@ -345,6 +347,7 @@ impl CheckedProgram {
         if report.has_errors() {
             return Err(report);
         }
+        let reals = context.declared.reals.iter().map(|bits| f64::from_bits(*bits)).collect();
         let constants = context
             .declared
             .constants
@@ -356,6 +359,7 @@ impl CheckedProgram {
             warnings: report,
             sources,
             constants,
+            reals,
             blocks,
             loops,
             plain_loops,

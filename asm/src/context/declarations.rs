@@ -10,7 +10,7 @@ use crate::ir::type_evidence::GivenTypes;
 use crate::ir::{Label, LabelId, RegisterId, RegisterKind, VirtualRegister};
 use foldhash::{HashMap, HashSet};
 use smallvec::SmallVec;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use takt_diagnostics::source::Span;
 use takt_isa::{Register, Type};
 use takt_syntax::ast::{Operand, Section};
@@ -104,6 +104,8 @@ pub(crate) struct Declarations {
     /// The types that the source gives to operands whose type the instruction leaves open.
     pub(crate) given: GivenTypes,
     pub(crate) arrays: Vec<Array>,
+    /// Real numbers in operands and data that binary32 does not have, as the bits of binary64.
+    pub(crate) reals: BTreeSet<u64>,
     /// Elements of all arrays.
     pub(crate) elements: usize,
     /// Arrays in data memory.
@@ -143,6 +145,7 @@ impl Declarations {
             typed: HashSet::default(),
             given: GivenTypes::default(),
             arrays: Vec::new(),
+            reals: BTreeSet::new(),
             elements: 0,
             tables: Vec::new(),
             indices: Vec::new(),

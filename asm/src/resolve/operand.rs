@@ -627,6 +627,12 @@ impl Resolver<'_> {
         let bits = value.bits(ty).map_err(|fault| self.context.fault(at.scope, EvalError { span, fault }))?;
         if let Value::Real(real) = value
             && ty != Type::I
+            && f64::from(f32::from_bits(bits)) != real
+        {
+            self.context.declared.reals.insert(real.to_bits());
+        }
+        if let Value::Real(real) = value
+            && ty != Type::I
             && bits << 1 == 0
             && real != 0.0
         {

@@ -1018,6 +1018,9 @@ fn accuracy_shows_literals_by_their_values() {
     assert_eq!(done.status, Some(1));
     assert!(done.stdout.contains("6:8-22: the divisor may be zero: 0.3, "), "{}", done.stdout);
     assert!(!done.stdout.contains("x14"), "{}", done.stdout);
+    let condition =
+        "\nconditions that exclude these\n  `max(x, least)` keeps a divisor from zero; `.assume x >= least`";
+    assert!(done.stdout.contains(condition), "{}", done.stdout);
     // Literals in a sum of integers are integers; a parameter has its name.
     folder.write(
         "sum.s",
@@ -1025,6 +1028,42 @@ fn accuracy_shows_literals_by_their_values() {
     );
     let done = folder.line("accuracy sum.s");
     assert!(done.stdout.contains("the integer sum may wrap: n in [0, 3], 2147483647"), "{}", done.stdout);
+}
+
+/// With `--constants real`, 0.1, a named constant and one that is computed count as rounded; 0.5 is a binary32 number.
+#[test]
+fn constants_stand_for_reals_where_asked() {
+    let folder = Folder::new();
+    let of = |expression: &str| {
+        let constant = if expression.contains('K') { ".const K = 0.3\n" } else { "" };
+        let text = format!(
+            "{constant}.ports latched\n.input x\n.output y\n.range x = 1, 8\n.period\np: y = {expression}\n wait p\n"
+        );
+        folder.write("c.s", text);
+        let error = |line: &str| {
+            let done = folder.line(line);
+            assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""), "{line}");
+            let json: serde_json::Value = serde_json::from_str(&done.stdout).unwrap();
+            json["outputs"][0]["error"].as_f64().unwrap()
+        };
+        (error("accuracy c.s --json"), error("accuracy c.s --json --constants real"))
+    };
+    for (expression, real) in [("0.1*x", 0.1), ("K*x", 0.3), ("(1/3)*x", 1.0 / 3.0)] {
+        let (exact, rounded) = of(expression);
+        let by = 8.0 * (f64::from(real as f32) - real).abs();
+        assert!((rounded - exact - by).abs() < 1e-12, "{expression}: {exact} {rounded} {by}");
+    }
+    let (exact, rounded) = of("0.5*x");
+    assert_eq!(exact, rounded);
+    folder.line("asm c.s -o c.elf");
+    for (line, text) in [
+        ("accuracy c.elf --constants real", "an image already"),
+        ("accuracy s.toml --constants real", "name the source of one core"),
+        ("accuracy c.s --inputs in.csv --constants real", "cannot be used with"),
+    ] {
+        let done = folder.line(line);
+        assert!(done.status != Some(0) && done.stderr.contains(text), "{line}: {}", done.stderr);
+    }
 }
 
 /// A root near zero makes the bound of one output, and nothing makes that of the other much larger than what runs show.

@@ -8,6 +8,8 @@ mod lines;
 mod measurement;
 
 use crate::run::application::Application;
+use crate::run::load::{Load, is_system};
+use crate::run::loaded_program::LoadedProgram;
 use crate::run::system::observers::Observer;
 use crate::run::system::run::SystemRun;
 use crate::run::table_run::{TableApplication, Tables};
@@ -18,7 +20,7 @@ use crate::terminal::output::Failure;
 use crate::terminal::progress::DelayedActivity;
 use anyhow::{Context, Result, anyhow, bail};
 use bound_report::BoundReport;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use comparison::Comparison;
 pub(crate) use measurement::MeasurementReport;
 use serde_json::{Map, Value, json};
@@ -66,9 +68,22 @@ pub(crate) struct Accuracy {
     /// the script that adds it up (`check.py`). It says which bounds it proves.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["inputs", "json"])]
     certificate: Option<PathBuf>,
+    /// Constants of the source as they are in the program, or as the real numbers that they stand for: with `real`, that a constant 0.1 is not
+    /// exactly 0.1 in binary32 counts as an error in the bounds.
+    #[arg(long, value_name = "KIND", conflicts_with_all = ["inputs", "certificate"])]
+    constants: Option<Constants>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// Meaning of the constants in a source.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Constants {
+    /// The binary32 number is meant.
+    Exact,
+    /// The real number in the source is meant.
+    Real,
 }
 
 const EXAMPLES: &str = "\
@@ -77,6 +92,7 @@ Examples:
   takt accuracy prog.s --inputs in.csv                errors against binary64, and the lines that they come from
   takt accuracy prog.s --inputs in.csv --each-period  without what states carry from period to period
   takt accuracy prog.s --inputs in.csv --bound        both, and the factor between them
+  takt accuracy prog.s --constants real               bounds that count the rounding of constants such as 0.1
   takt accuracy prog.s --certificate proof            bounds, and their derivation for `python3 proof/check.py proof`
   takt accuracy system.toml --inputs in.csv           of each core, in a run of the system";
 
@@ -84,6 +100,10 @@ pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()
     let mut reads = vec![("FILE", arguments.file.as_path())];
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
     files::check(&reads, &[])?;
+    if arguments.constants == Some(Constants::Real) {
+        let (application, reals) = with_reals(arguments, color)?;
+        return bounded(arguments, &application, &reals, out);
+    }
     let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
     match &arguments.inputs {
         Some(inputs) => {
@@ -94,8 +114,20 @@ pub(crate) fn run(arguments: &Accuracy, color: bool, out: &mut Out) -> Result<()
             let shadows = shadows.map_err(|error| application.located_error(error, color))?;
             measured(arguments, &application, &shadows, out)
         }
-        None => bounded(arguments, &application, out),
+        None => bounded(arguments, &application, &Reals::default(), out),
     }
+}
+
+/// Assembles a source, with the real numbers that its constants stand for, which an image does not have.
+fn with_reals(arguments: &Accuracy, color: bool) -> Result<(Application, Reals)> {
+    if is_system(&arguments.file) {
+        let text = "--constants applies to a program; name the source of one core";
+        return Err(Failure::Usage(text.to_owned()).into());
+    }
+    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
+    let assembled = load.finish(load.assemble(&arguments.file, Load::source(&arguments.file)?))?;
+    let reals = Reals { inputs: false, constants: assembled.reals.clone() };
+    Ok((Application::Program(Box::new(LoadedProgram::from(assembled))), reals))
 }
 
 /// Progress of an enclosure, which takes half a minute for a program of many branches.
@@ -105,7 +137,7 @@ fn bounding(program: &Program) -> DelayedActivity {
 }
 
 /// Prints proved error bounds of each core, from the ranges in its source.
-fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Result<()> {
+fn bounded(arguments: &Accuracy, application: &Application, reals: &Reals, out: &mut Out) -> Result<()> {
     if arguments.certificate.is_some() && application.system().is_some() {
         let text = "--certificate applies to a program; name the source of one core";
         return Err(Failure::Usage(text.to_owned()).into());
@@ -116,7 +148,7 @@ fn bounded(arguments: &Accuracy, application: &Application, out: &mut Out) -> Re
         let program = &loaded.program;
         let found = {
             let _waiting = bounding(program);
-            enclose_in_boxes(program, &Reals::default())
+            enclose_in_boxes(program, reals)
         };
         let enclosure = match (found, application.system()) {
             (Ok(enclosure), _) => Ok(enclosure),

@@ -6,6 +6,7 @@ use crate::terminal::files::Out;
 use crate::terminal::number::rounded;
 use anyhow::Result;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::io::Write;
 use takt_analysis::accuracy::{
     Converging, Enclosure, ErrorShare, Hazard, Interval, Moment, OutputBound, Problem, Relied, UnprovedRange,
@@ -30,6 +31,27 @@ pub(super) fn ulps_text(ulps: f64) -> String {
 
 fn interval(interval: Option<Interval>) -> String {
     interval.map_or_else(|| "anywhere".to_owned(), |Interval { low, high }| ends_text(low, high))
+}
+
+/// Condition that excludes a hazard, as a source states it.
+fn condition(problem: Problem) -> Option<&'static str> {
+    Some(match problem {
+        Problem::DivisionByZero => {
+            "`max(x, least)` keeps a divisor from zero; `.assume x >= least` behind the operation that computes it says that it is never less"
+        }
+        Problem::Domain => {
+            "`max(x, 0)` keeps the operand of a root, `sat(x, 1)` that of an arccosine where the function has a value; `.assume` says that it lies there"
+        }
+        Problem::Overflow => "a narrower `.range`, `sat(x, most)` or `.assume x <= most` limits the operands",
+        Problem::Conversion => "`sat(x, 2^30)` limits the number that is converted",
+        Problem::NotFinite | Problem::Output => {
+            "a `.range` of the input, state or array that the value comes from"
+        }
+        Problem::Wrap => "a narrower `.range` of the integers, or `min` and `max`",
+        Problem::Shift => "`min(max(n, 0), 31)` limits the amount",
+        Problem::Address => "`min(max(i, first), last)` limits the index; `.range` says which values it has",
+        Problem::Bits | Problem::Unbounded | Problem::Told => return None,
+    })
 }
 
 impl BoundReport<'_> {
@@ -91,6 +113,7 @@ impl BoundReport<'_> {
             json!({
                 "place": program.word_text(hazard.word as usize),
                 "problem": hazard.problem.to_string(),
+                "condition": condition(hazard.problem),
                 "operands": operands.collect::<Vec<_>>(),
             })
         };
@@ -189,6 +212,12 @@ impl BoundReport<'_> {
             let what = hazard.problem;
             writeln!(out, "  {}: {what}: {}", program.word_text(hazard.word as usize), operands.join(", "))?;
         }
+        let problems: BTreeSet<Problem> = enclosure.hazards.iter().map(|hazard| hazard.problem).collect();
+        let conditions: Vec<&str> = problems.into_iter().filter_map(condition).collect();
+        if !conditions.is_empty() {
+            writeln!(out, "\nconditions that exclude these")?;
+        }
+        conditions.iter().try_for_each(|condition| writeln!(out, "  {condition}"))?;
         let states = |UnprovedRange { range, found, .. }: &UnprovedRange, found_text: &str, out: &mut Out| {
             let (low, high) = range.ends();
             let name = range.name(program);
