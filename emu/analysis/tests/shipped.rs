@@ -45,15 +45,21 @@ fn programs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../programs")
 }
 
+/// Files of its own folder that a source includes.
+fn included(path: &Path) -> Vec<PathBuf> {
+    let text = std::fs::read_to_string(path).expect("a source");
+    let names = text.lines().filter_map(|line| line.strip_prefix(".include \"")?.strip_suffix('"'));
+    names.map(|name| path.with_file_name(name)).collect()
+}
+
 /// The source has a period: in itself, or in a file of its folder that it includes.
 fn has_period(path: &Path) -> bool {
     let text = std::fs::read_to_string(path).expect("a source");
-    let included = text.lines().filter_map(|line| line.strip_prefix(".include \"")?.strip_suffix('"'));
-    text.lines().any(|line| line.starts_with(".period"))
-        || included.into_iter().any(|file| has_period(&path.with_file_name(file)))
+    text.lines().any(|line| line.starts_with(".period")) || included(path).iter().any(|file| has_period(file))
 }
 
-/// Paths of the programs, relative to `programs/`: sources with a period. Those of `three/` are for machines that a system names.
+/// Paths of the programs, relative to `programs/`: sources with a period, but for those that are a part of another. Those of `three/` are for
+/// machines that a system names.
 fn paths() -> Vec<String> {
     let mut paths = Vec::new();
     for folder in FOLDERS {
@@ -71,16 +77,22 @@ fn paths() -> Vec<String> {
             }
         }
         found.sort();
+        let parts: Vec<PathBuf> = found.iter().flat_map(|name| included(&programs().join(name))).collect();
+        found.retain(|name| !parts.contains(&programs().join(name)) || assemble(name).is_ok());
         paths.append(&mut found);
     }
     paths
 }
 
-fn assembled(path: &str) -> Program {
+fn assemble(path: &str) -> Result<Program, String> {
     let (folder, file) = path.rsplit_once('/').unwrap();
     let loader = Search::new(FileLoader::new(programs().join(folder))).library(takt_programs::LIBRARY);
     let assembled = takt_asm::assemble(file, &loader, &Options::default());
-    assembled.unwrap_or_else(|diagnostics| panic!("{path}: {}", diagnostics.render(false))).program
+    assembled.map(|assembled| assembled.program).map_err(|mistakes| mistakes.render(false))
+}
+
+fn assembled(path: &str) -> Program {
+    assemble(path).unwrap_or_else(|mistakes| panic!("{path}: {mistakes}"))
 }
 
 /// Generated bodies: a robot's file, the link at its end, and the name in the table.
