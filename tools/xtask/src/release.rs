@@ -82,24 +82,19 @@ pub(crate) fn readme(root: &Path) -> Result<String> {
 /// How to install a release that is at an address, or that is yet to be built.
 fn installation(address: Option<&str>) -> String {
     let [x86, aarch] = TARGETS;
-    let (from, fetch) = match address {
-        Some(address) => (
-            format!("A release is at <{address}>; [from source](#from-source), it takes two commands. The files:"),
-            format!("curl -LO {address}/takt-{VERSION}-{x86}.tar.gz\n"),
+    let files = "`takt` for Linux on x86-64 and aarch64 as one file that needs nothing else, the wheel for Python, the extension for VS Code,\n\
+                 configurations for other editors, the playground and the book";
+    match address {
+        Some(address) => format!(
+            "A release is at <{address}>; [from source](#from-source), it takes two commands. The files:\n{files}.\n\n\
+             ```sh\ncurl -LO {address}/takt-{VERSION}-{x86}.tar.gz\ntar xzf takt-{VERSION}-{x86}.tar.gz        # or -{aarch}\n\
+             sudo install takt-{VERSION}-{x86}/takt /usr/local/bin\ntakt track\n```\n"
         ),
-        None => (
-            "No release is published yet: two commands run Takt [from source](#from-source), and `cargo xtask release` writes the files:"
-                .to_owned(),
-            String::new(),
+        None => format!(
+            "[From source](#from-source), with Rust and nothing else:\n\n```sh\ncargo run --release -- track\n```\n\n\
+             No release is published yet; `cargo xtask release` writes its files:\n{files}.\n"
         ),
-    };
-    format!(
-        "{from}\n`takt` for Linux on x86-64 and aarch64 as one file that needs nothing else, the wheel for Python, the extension for VS Code,\n\
-         configurations for other editors, the playground and the book.\n\n\
-         ```sh\n{fetch}tar xzf takt-{VERSION}-{x86}.tar.gz        # or -{aarch}\n\
-         sudo install takt-{VERSION}-{x86}/takt /usr/local/bin\n\
-         takt track\n```\n"
-    )
+    }
 }
 
 /// Entry of `cargo xtask release`.

@@ -361,7 +361,7 @@ function showCycles() {
     const least = run.shortest, most = run.longest;
     put(least === most ? `${most.toLocaleString("en")} cycles` : `${least.toLocaleString("en")} to ${most.toLocaleString("en")} cycles`, "b");
     put(` a period, in ${plural(run.cycles.length, "period")}${run.missed ? `, ${plural(run.missed, "deadline")} missed` : ""}`);
-  } else if (run) put(`${plural(run.total, "cycle")}`, "b");
+  } else put(run ? `${plural(run.total, "cycle")}` : "running …", "b");
   const least = Math.max(...periods.map((section) => section.least ?? 0));
   if (least > 0) put(` · no schedule takes fewer than ${least}`);
   for (const section of periods) put(` · ${section.name} takes ${range(section.cycles)} whatever the inputs`);

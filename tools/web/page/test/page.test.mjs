@@ -404,6 +404,7 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   assert.ok((await opacity("#step .columns")) < 0.5);
   // The page recomputes without a request.
   await page.waitForFunction(() => !document.body.classList.contains("stale"));
+  await done(page);
   assert.match(await cycles(page), /38 cycles a period/);
   // While the text has a mistake, results remain dimmed, and the mistake is reported.
   await page.keyboard.press("Enter");
