@@ -41,6 +41,7 @@ export class Drive {
   /** Sets, before the first drive, whether the program can drive the robot. */
   set fits(on) {
     if (!this.idle) return;
+    el("drive").disabled = el("scene").hidden = !on;
     el("drove").replaceChildren(on ? "The program as the controller of the five-axis hybrid robot, in a closed loop." : "This program has other ports than a controller of the five-axis hybrid robot. The example ");
     if (!on) el("drove").append(Object.assign(document.createElement("a"), { href: "#example=tracking.s", textContent: "tracking.s" }), " is one.");
   }
@@ -74,9 +75,11 @@ export class Drive {
   }
 
   drive() {
+    if (this.idle) el("drove").textContent = "The drive begins as soon as the program is assembled.";
     return this.work(async () => {
       if (!(await this.current())) return;
       this.clear();
+      el("drove").textContent = "The robot starts …";
       this.driving = this.tried = true;
       const mine = this.drives;
       try {
