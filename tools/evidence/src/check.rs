@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The command `cargo evidence check`: evidence that CI collects; each check is repeated only when its inputs change.
 
+use crate::threads::{at_once, cores};
 use crate::{boards, certificates, clients, fmu_windows, formal, linuxcnc, litex, routed};
-use anyhow::{Result, ensure};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
-use std::thread;
+use anyhow::{Context, Result, ensure};
 use takt_automation::check_cache::{self, Inputs, LINUXCNC, OPERANDS};
 use takt_automation::command::install;
 use takt_automation::progress;
@@ -78,39 +76,19 @@ pub(crate) fn check(arguments: &Arguments) -> Result<()> {
             check_cache::leave_out(share.name, "takes longer");
         }
     }
-    at_once(&due)?;
+    // The solvers have one thread each.
+    at_once(&due, cores(), |_, (share, is_named)| {
+        match share.inputs {
+            Some(inputs) => check_cache::once(share.name, &inputs()?, *is_named, share.run),
+            None => progress::step(share.name, share.run),
+        }
+        .with_context(|| format!("the check `{}` failed", share.name))
+    })?;
     if arguments.names.is_empty() {
         check_cache::leave_out(OPERANDS, "takes longer");
     }
     print!("{}", check_cache::left_out());
     Ok(())
-}
-
-/// Runs checks, those that were named even if they have passed: one on each core, since their solvers have one thread.
-fn at_once(due: &[(&Share, bool)]) -> Result<()> {
-    let run = |(share, is_named): &(&Share, bool)| match share.inputs {
-        Some(inputs) => check_cache::once(share.name, &inputs()?, *is_named, share.run),
-        None => progress::step(share.name, share.run),
-    };
-    let (next, failed) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    let cores = thread::available_parallelism().map_or(1, usize::from);
-    thread::scope(|scope| {
-        for _ in 0..cores.min(due.len()) {
-            scope.spawn(|| {
-                while let Some(share) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    if let Err(error) = run(share) {
-                        failed.lock().unwrap_or_else(PoisonError::into_inner).push((share.0.name, error));
-                    }
-                }
-            });
-        }
-    });
-    let mut failed = failed.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter();
-    let Some((name, error)) = failed.next() else { return Ok(()) };
-    for (name, error) in failed {
-        eprintln!("error: {name}: {error:#}");
-    }
-    Err(error.context(format!("the check `{name}` failed")))
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ mod other_processors;
 mod routed;
 mod speed;
 mod synth;
+mod threads;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};

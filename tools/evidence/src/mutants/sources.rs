@@ -5,16 +5,14 @@ use super::Arguments;
 use super::results::{KnownOutcomes, Outcome};
 use super::run::{CHOICE, REACHED, Test, Verdict, numbers, verdict};
 use super::rust::{self, Mutant};
+use crate::threads::{at_once, cores};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 use takt_automation::command::{cargo, root};
 use takt_automation::progress;
@@ -248,7 +246,8 @@ fn score_of(part: &Part, arguments: &Arguments, planted: &PlantedMutants<'_>) ->
     };
     let begin = Instant::now();
     let shared = Mutex::new((&mut known, 0));
-    at_once(&open, |_, number| {
+    // Tests are judged by CPU time, so they may run concurrently.
+    at_once(&open, cores(), |_, number| {
         let outcome = meet(*number, Duration::from_secs(part.budget), &tests, planted.programs)?;
         let (source, mutant) = planted.of(*number);
         let (known, done) = &mut *shared.lock().unwrap_or_else(PoisonError::into_inner);
@@ -449,24 +448,6 @@ fn refused(messages: &[Value], sources: &[&Source], known: &BTreeSet<u32>) -> BT
     found
 }
 
-/// Calls `work` for each element with the number of the thread, on as many threads as there are cores. Tests are judged by CPU time, so
-/// they may run concurrently.
-fn at_once<T: Sync>(all: &[T], work: impl Fn(usize, &T) -> Result<()> + Sync) -> Result<()> {
-    let next = AtomicUsize::new(0);
-    let threads = available_parallelism().map_or(1, NonZeroUsize::get);
-    let thread = |own: usize| -> Result<()> {
-        while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
-            // On an error, the other threads finish their current element and stop.
-            work(own, one).inspect_err(|_| next.store(all.len(), Ordering::Relaxed))?;
-        }
-        Ok(())
-    };
-    std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..threads).map(|own| scope.spawn(move || thread(own))).collect();
-        threads.into_iter().try_for_each(|thread| thread.join().expect("a thread does not panic"))
-    })
-}
-
 /// Runs each test whose name contains `test_name` without a mutant, to measure its time and the mutants that it reaches.
 fn baseline(part: &Part, test_name: &str, programs: &[Program], reached: &Path) -> Result<Vec<Test>> {
     let mut names = Vec::new();
@@ -482,7 +463,7 @@ fn baseline(part: &Part, test_name: &str, programs: &[Program], reached: &Path) 
         }
     }
     let tests = Mutex::new(Vec::new());
-    at_once(&names, |thread, (index, name)| {
+    at_once(&names, cores(), |thread, (index, name)| {
         let program = &programs[*index];
         // Another part may be measured at the same time.
         let reached = reached.with_extension(format!("{}.{thread}.txt", part.name));

@@ -3,17 +3,15 @@
 
 use super::text::{lacking, parts_in_words};
 use super::{Arguments, Design, system};
+use crate::threads::{at_once, cores};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::fs;
 use std::path::Path;
 use std::process::Command;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-use std::{fs, thread};
 use takt_automation::check_cache::Inputs;
 use takt_automation::command::root;
 use takt_automation::venv::{Venv, YOSYS};
@@ -92,8 +90,8 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         step(format!("seed {seed}: {:.1} MHz", clock(&report)?));
         Ok(report)
     };
-    let jobs = arguments.jobs.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
-    let reports = parallel(&seeds, jobs, route)?;
+    let jobs = arguments.jobs.unwrap_or_else(cores);
+    let reports = at_once(&seeds, jobs, |_, seed| route(*seed))?;
     progress.finish_and_clear();
 
     row.grade = Some(grade);
@@ -106,27 +104,6 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
     row.critical_path = critical_path(&reports[middle], family).context("nextpnr's report has no path")?;
     write!(row.tools, ", {}", place.package.replace("yowasp-", "").replace("==", " "))?;
     Ok(row)
-}
-
-/// Calls `work` for each seed in at most `jobs` threads; stops at the first error.
-fn parallel<T: Send>(seeds: &[u32], jobs: usize, work: impl Fn(u32) -> Result<T> + Sync) -> Result<Vec<T>> {
-    let (next, results) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
-    thread::scope(|scope| {
-        for _ in 0..jobs.clamp(1, seeds.len().max(1)) {
-            scope.spawn(|| {
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(&seed) = seeds.get(index) else { break };
-                    let result = work(seed);
-                    if result.is_err() {
-                        next.store(seeds.len(), Ordering::Relaxed);
-                    }
-                    results.lock().expect("no thread panics").insert(index, result);
-                }
-            });
-        }
-    });
-    results.into_inner().expect("no thread panics").into_values().collect()
 }
 
 fn read(path: &Path) -> Result<Value> {
