@@ -2,7 +2,7 @@
 //! A plant between the output and the input ports of a program.
 
 use super::file::{self, CODE, Course, Entry, PlantFile, PortOf, UNLIMITED, entry_of, listed};
-use super::{Interface, Plant, indexed_parts};
+use super::{Interface, Plant, indexed_parts, is_of};
 use std::sync::Arc;
 use takt_diagnostics::diag::{Diagnostic, Diagnostics};
 use takt_diagnostics::nearest;
@@ -166,7 +166,7 @@ impl Connector<'_> {
         let Some(entry) = entry_of(&self.ports, signal).cloned() else {
             return find(signal).map(|port| (port, PortOf::named(signal)));
         };
-        // What is for all copies names an array of ports.
+        // An entry for all copies names an array of ports.
         let index = indexed_parts(signal).filter(|_| entry.name != signal).map_or("", |(_, index)| index);
         let port = &format!("{}{index}", entry.value.port);
         let found = find(port);
@@ -184,9 +184,7 @@ impl Connector<'_> {
         let Interface { name: plant, inputs: takes, sensors: gives, .. } = self.interface;
         let names = || takes.iter().map(|(name, _)| name.as_str()).chain(gives.iter().map(String::as_str));
         let copies = self.file.copies;
-        let is_signal = |name: &str, entry: &str| {
-            name == entry || copies > 1 && indexed_parts(name).is_some_and(|(of, _)| of == entry)
-        };
+        let is_signal = |name: &str, entry: &str| name == entry || copies > 1 && is_of(name, entry);
         for entry in self.ports.clone() {
             if !names().any(|name| is_signal(name, &entry.name)) {
                 let near = nearest(&entry.name, names());

@@ -145,6 +145,11 @@ fn indexed_parts(name: &str) -> Option<(&str, &str)> {
     name.ends_with(']').then(|| name.find('[').map(|at| name.split_at(at)))?
 }
 
+/// The signal has this name, or is that of a copy.
+fn is_of(signal: &str, name: &str) -> bool {
+    signal == name || indexed_parts(signal).is_some_and(|(of, _)| of == name)
+}
+
 /// Names of a plant's signals.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Interface {
@@ -177,9 +182,8 @@ impl Interface {
 
     /// Indices of the sensors that a name stands for: the one of this name, or those of all copies.
     pub fn sensors_named(&self, name: &str) -> Vec<usize> {
-        let is_one =
-            |sensor: &String| sensor == name || indexed_parts(sensor).is_some_and(|(of, _)| of == name);
-        self.sensors.iter().enumerate().filter(|(_, sensor)| is_one(sensor)).map(|(index, _)| index).collect()
+        let all = self.sensors.iter().enumerate();
+        all.filter(|(_, sensor)| is_of(sensor, name)).map(|(index, _)| index).collect()
     }
 }
 
