@@ -322,7 +322,7 @@ fn stored_activations_keep_their_range_and_slope() {
     let enclosure = held(&with_library(&text, &F3));
     let ((range, error), (_, of_sum)) = (output(&enclosure, "v"), output(&enclosure, "y"));
     assert!(range.magnitude() <= 1.0 && error < 4.0 * of_sum, "{range:?} {error:e} {of_sum:e}");
-    // Where the sign is known, the divisor of the function is.
+    // A known sign makes the function's divisor known.
     let text = text.replace("-8, 8", "0.4, 4");
     let enclosure = held(&with_library(&text, &F3));
     assert!(enclosure.hazards.is_empty(), "{enclosure:?}");

@@ -79,7 +79,7 @@ pub(crate) fn readme(root: &Path) -> Result<String> {
     Ok(format!("{before}{}{}{}{after}", INSTALL[0], installation(ADDRESS), INSTALL[1]))
 }
 
-/// How to install a release that is at an address, or that is yet to be built.
+/// Installation from the release at an address, or, without one, from source.
 fn installation(address: Option<&str>) -> String {
     let [x86, aarch] = TARGETS;
     let files = "`takt` for Linux on x86-64 and aarch64 as one file that needs nothing else, the wheel for Python, the extension for VS Code,\n\

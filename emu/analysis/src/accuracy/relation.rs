@@ -74,23 +74,17 @@ fn ratio(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> Option<f64> {
 /// Term of a sum that is a product.
 struct Product<'n> {
     factors: [&'n Rc<Node>; 2],
-    negative: bool,
     /// Node of the product, if it is rounded by itself.
     rounded: Option<&'n Rc<Node>>,
 }
 
-/// Product that a part of a meaning is, or the operation that gave its source.
+/// Product that a part of a meaning is, or the operation that gave its source, with either sign.
 fn product<'n>(meaning: &Meaning, operands: &'n [Rc<Node>; 3]) -> Option<Product<'n>> {
     match meaning {
-        Meaning::Neg(of) => {
-            let product = product(of, operands)?;
-            Some(Product { negative: !product.negative, ..product })
+        Meaning::Neg(of) => product(of, operands),
+        Meaning::Mul(of) => {
+            Some(Product { factors: [source(&of[0], operands)?, source(&of[1], operands)?], rounded: None })
         }
-        Meaning::Mul(of) => Some(Product {
-            factors: [source(&of[0], operands)?, source(&of[1], operands)?],
-            negative: false,
-            rounded: None,
-        }),
         Meaning::Source(place) => {
             let node = &operands[*place];
             let (meaning, operands) = made(node)?;
