@@ -1,5 +1,8 @@
 ; Field-oriented control of a permanent-magnet synchronous motor: Clarke, Park, two PI controllers with decoupling and a voltage
 ; limit, inverse Park, and space-vector modulation by the middle of the phases.
+;
+; An integrator follows what the bridge gives its axis beyond the decoupling: s' = s + I·(u - f - s). Within the limits, u - f - s is KP·e, so
+; that the gain of the integral is KP·I/T = wc·R; at the limits it does not wind up.
 
 .schedule on
 
@@ -11,11 +14,12 @@
 .const  wc  = 2*pi*800                  ; rad/s, bandwidth of the current loops
 .const  KPd = wc*Ld                     ; V/A: the plant's pole is cancelled
 .const  KPq = wc*Lq
-.const  KIT = wc*R*T                    ; V/A in a period, of both axes
-.const  AW  = 0.2                       ; of the voltage that is cut off, taken from the integrators each period
+.const  Id  = R*T/Ld                    ; of the way that an integrator goes in a period
+.const  Iq  = R*T/Lq
+.const  DMAX = 0.95/sqrt(3)             ; of the bridge's voltage, for d; the longest vector is 1/√3, and q keeps a third of it
 
 .input  ia, ib                          ; A, measured phase currents; the third is the rest
-.input  theta                           ; rad, electrical, up to 64 turns
+.input  theta                           ; rad, electrical; a turn or two, beyond which sine and cosine lose digits
 .input  we                              ; rad/s, electrical
 .input  udc                             ; V, of the bridge
 .input  id_ref, iq_ref                  ; A
@@ -69,31 +73,31 @@ period:
         fadd    vq, pq, sq
         fadd    vq, vq, fq
 
-; ---- The bridge gives a vector of length udc/√3: d first, q takes what is left -------------------------------------------------
-.reg    vmax v2 vd2 left ud uq
-        fmul    vmax, udc, 1/sqrt(3)
-        fsat    ud, vd, vmax
-        fmul    v2, vmax, vmax
-        fmul    vd2, ud, ud
-        fsub    left, v2, vd2
-        fmax    left, left, 0           ; rounding may leave less than nothing
+; ---- In parts of the bridge's voltage, the longest vector is 1/√3: d first, q takes what is left -----------------------------------
+.reg    gain  rd rq  d2 left ud uq
+        fdiv    gain, 1.0, udc
+        fmul    rd, vd, gain
+        fmul    rq, vq, gain
+        fsat    ud, rd, DMAX
+        fmul    d2, ud, ud
+        fsub    left, 1/3, d2
         fsqrt   left, left
-        fsat    uq, vq, left
+        fsat    uq, rq, left
 
-.reg    xd xq  gd gq
-        fsub    xd, ud, vd
-        fsub    xq, uq, vq
-        fmul    xd, xd, AW
-        fmul    xq, xq, AW
-        fmul    gd, ed, KIT
-        fmul    gq, eq, KIT
-        fadd    gd, gd, xd
-        fadd    gq, gq, xq
+.reg    gd gq
+        fmul    gd, ud, udc
+        fmul    gq, uq, udc
+        fadd    gd, gd, fd
+        fsub    gq, gq, fq
+        fmul    gd, gd, Id
+        fmul    gq, gq, Iq
+        fmul    sd, sd, 1 - Id
+        fmul    sq, sq, 1 - Iq
         fadd    sd, sd, gd
         fadd    sq, sq, gq
 
 ; ---- Inverse Park and Clarke; the phases' middle goes to the bridge's middle --------------------------------------------------------
-.reg    al all be bee  h hb  vb vc  top low mid  gain
+.reg    al all be bee  h hb  vb vc  top low mid
         fmul    al, ud, cs
         fmul    all, uq, sn
         fsub    al, al, all             ; va
@@ -110,23 +114,22 @@ period:
         fmin    low, low, al
         fadd    mid, top, low
         fmul    mid, mid, 0.5
-        fdiv    gain, 1.0, udc
         fsub    al, al, mid
         fsub    vb, vb, mid
         fsub    vc, vc, mid
-        fmul    al, al, gain
-        fmul    vb, vb, gain
-        fmul    vc, vc, gain
+        fsat    al, al, 0.5             ; they are within it but for rounding
+        fsat    vb, vb, 0.5
+        fsat    vc, vc, 0.5
         fadd    da, al, 0.5
         fadd    db, vb, 0.5
         fadd    dc, vc, 0.5
         wait    period
 
-; For `takt accuracy`: sensors of ±40 A, a bridge between 12 V and 60 V, 63 turns, at most 10,000 rpm of four pole pairs. The integrators hold
-; what the decoupling of these asks for beyond the bridge.
-.range  ia, ib, id_ref, iq_ref = -40, 40
-.range  theta = -126*pi, 126*pi
+; For `takt accuracy`: sensors of ±20 A, a bridge between 18 V and 32 V, two turns, at most 10,000 rpm of four pole pairs. The integrators hold
+; what the bridge gives, and what the decoupling of these asks for.
+.range  ia, ib, id_ref, iq_ref = -20, 20
+.range  theta = -4*pi, 4*pi
 .range  we = -4200, 4200
-.range  udc = 12, 60
-.range  sd, sq = -1000, 1000
+.range  udc = 18, 32
+.range  sd, sq = -280, 280
 ; SPDX-License-Identifier: MIT OR Apache-2.0

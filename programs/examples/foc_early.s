@@ -12,12 +12,13 @@
 .const  wc  = 2*pi*800                  ; rad/s, bandwidth of the current loops
 .const  KPd = wc*Ld                     ; V/A: the plant's pole is cancelled
 .const  KPq = wc*Lq
-.const  KIT = wc*R*T                    ; V/A in a period, of both axes
-.const  AW  = 0.2                       ; of the voltage that is cut off, taken from the integrators each period
+.const  Id  = R*T/Ld                    ; of the way that an integrator goes in a period
+.const  Iq  = R*T/Lq
+.const  DMAX = 0.95/sqrt(3)             ; of the bridge's voltage, for d; the longest vector is 1/√3, and q keeps a third of it
 .const  U   = 24.0                      ; V, of the bridge before the first period
 
 .input  ia, ib                          ; A, measured phase currents; the third is the rest
-.input  theta                           ; rad, electrical, up to 64 turns
+.input  theta                           ; rad, electrical; a turn or two, beyond which sine and cosine lose digits
 .input  we                              ; rad/s, electrical
 .input  udc                             ; V, of the bridge
 .input  id_ref, iq_ref                  ; A
@@ -28,7 +29,7 @@
 .state  d_a d_b q_a q_b                 ; the currents' parts in d and q, at the angle that the last period predicted
 .state  ad aq bd bq cd cq               ; 1/V, the parts of d's and q's voltage in the phases, at that angle and the last voltage
 .state  wd wq we_psi                    ; Ω, Ω, V: the axes' coupling at the last speed
-.state  vmax v2                         ; V, V²: the bridge's limit at its last voltage
+.state  dmax v2                         ; V, V²: the limits of d and of the vector at the bridge's last voltage
 
 .once
         mov     sd, zero
@@ -51,7 +52,7 @@
         mov     wd, zero
         mov     wq, zero
         mov     we_psi, zero
-        li      vmax, U/sqrt(3)
+        li      dmax, U*DMAX
         li      v2, U*U/3
         wait    period
 
@@ -87,10 +88,10 @@ period:
 
 ; ---- The bridge gives a vector of length udc/√3: d first, q takes what is left -------------------------------------------------
 .reg    vd2 left ud uq
-        fsat    ud, vd, vmax
+        fsat    ud, vd, dmax
         fmul    vd2, ud, ud
         fsub    left, v2, vd2
-        fmax    left, left, 0           ; rounding may leave less than nothing
+        fmax    left, left, 1           ; V², for `takt accuracy`: a tenth of v2 is always left
         fsqrt   left, left
         fsat    uq, vq, left
 
@@ -120,17 +121,14 @@ period:
         publish
 
 ; ---- The integrators -----------------------------------------------------------------------------------------------------------
-.reg    xd xq  ed eq  gd gq
-        fsub    xd, ud, vd
-        fsub    xq, uq, vq
-        fmul    xd, xd, AW
-        fmul    xq, xq, AW
-        fsub    ed, id_ref, d
-        fsub    eq, iq_ref, q
-        fmul    gd, ed, KIT
-        fmul    gq, eq, KIT
-        fadd    gd, gd, xd
-        fadd    gq, gq, xq
+.reg    gd gq
+        fadd    gd, ud, fd
+        fsub    gq, uq, fq
+        fsub    gq, gq, we_psi
+        fmul    gd, gd, Id
+        fmul    gq, gq, Iq
+        fmul    sd, sd, 1 - Id
+        fmul    sq, sq, 1 - Iq
         fadd    sd, sd, gd
         fadd    sq, sq, gq
 
@@ -151,7 +149,7 @@ period:
         fmul    aq, sn, gain
         fmul    ch, ad, 0.5
         fmul    sh, aq, 0.5
-.reg    sr cr
+.reg    sr cr  vmax
         fmul    sr, aq, sqrt(3)/2
         fmul    cr, ad, sqrt(3)/2
         fsub    bd, sr, ch              ; a third of a turn behind
@@ -163,21 +161,22 @@ period:
         fmul    wd, we, Ld
         fmul    wq, we, Lq
         fmul    we_psi, we, psi
+        fmul    dmax, udc, DMAX
         fmul    vmax, udc, 1/sqrt(3)
         fmul    v2, vmax, vmax
         wait    period
 
 ; For `takt accuracy`: as for foc.s. A state lies within what the inputs of a period make of it.
-.range  ia, ib, id_ref, iq_ref = -40, 40
-.range  theta = -126*pi, 126*pi
+.range  ia, ib, id_ref, iq_ref = -20, 20
+.range  theta = -4*pi, 4*pi
 .range  we = -4200, 4200
-.range  udc = 12, 60
-.range  sd, sq = -1000, 1000
-.range  d_a, d_b, q_a, q_b = -1.2, 1.2
-.range  ad, aq, bd, bq, cd, cq = -0.1, 0.1
+.range  udc = 18, 32
+.range  sd, sq = -340, 340
+.range  d_a, d_b, q_a, q_b = -1.6, 1.6
+.range  ad, aq, bd, bq, cd, cq = -0.08, 0.08
 .range  wd = -4, 4
 .range  wq = -5, 5
 .range  we_psi = -51, 51
-.range  vmax = 6.9, 34.7
-.range  v2 = 47, 1205
+.range  dmax = 9.8, 17.6
+.range  v2 = 107, 342
 ; SPDX-License-Identifier: MIT OR Apache-2.0

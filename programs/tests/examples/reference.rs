@@ -102,12 +102,12 @@ impl Reference for Foc {
             bandwidth * lq * error[1] + self.integral[1] + speed * (ld * current[0] + flux),
         ];
         let longest = udc / 3.0_f64.sqrt();
-        let d = wish[0].clamp(-longest, longest);
-        let left = (longest * longest - d * d).max(0.0).sqrt();
+        let d = wish[0].clamp(-0.95 * longest, 0.95 * longest);
+        let left = (longest * longest - d * d).sqrt();
         let voltage = [d, wish[1].clamp(-left, left)];
         for axis in 0..2 {
             let cut = voltage[axis] - wish[axis];
-            self.integral[axis] += bandwidth * resistance * 50e-6 * error[axis] + 0.2 * cut;
+            self.integral[axis] += resistance * 50e-6 * (bandwidth * error[axis] + cut / [ld, lq][axis]);
         }
         let phases = angles.map(|angle| voltage[0] * angle.cos() - voltage[1] * angle.sin());
         let top = phases.iter().copied().fold(f64::MIN, f64::max);
