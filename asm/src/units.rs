@@ -41,9 +41,11 @@ fn declaration<'s>(
     })
 }
 
+/// Names and units of the constants that state the sampling period.
+pub const PERIODS: [(&str, &str); 4] = [("T", "s"), ("Ts", "s"), ("FS", "Hz"), ("fs", "Hz")];
+
 /// Sampling period in seconds: the constant `T` or `Ts` whose comment begins with `s`, or the reciprocal of `FS` or `fs` in Hz.
 pub fn sampling_period(sources: &[(String, String)], constants: &[(String, Number)]) -> Option<f64> {
-    const NAMES: [(&str, &str); 4] = [("T", "s"), ("Ts", "s"), ("FS", "Hz"), ("fs", "Hz")];
     let of = |(name, wanted): (&str, &str)| {
         let lines = sources.iter().flat_map(|(_, text)| text.lines());
         let mut declared = lines.filter_map(|line| line.trim_start().strip_prefix(".const"));
@@ -58,7 +60,7 @@ pub fn sampling_period(sources: &[(String, String)], constants: &[(String, Numbe
         let seconds = if wanted == "Hz" { value.recip() } else { value };
         Some(seconds).filter(|seconds| seconds.is_finite() && *seconds > 0.0)
     };
-    NAMES.into_iter().find_map(of)
+    PERIODS.into_iter().find_map(of)
 }
 
 /// A declared name, such as `x:int`, `y[3]` or `x{i}`, includes the port.

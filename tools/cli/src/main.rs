@@ -12,6 +12,7 @@ use run::machine_mistake;
 use std::io::Write;
 use std::process::ExitCode;
 use terminal::files::Out;
+use terminal::groups;
 use terminal::output::{self, Color, Failure};
 use terminal::page::Page;
 use terminal::suggest;
@@ -157,7 +158,8 @@ fn fit(command: clap::Command, page: Page) -> clap::Command {
 
 /// Parses the arguments. If clap has answered instead (help, version, a mistake), the error is the exit status.
 fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
-    let command = fit(Arguments::command(), Page::of_stdout(None));
+    let page = Page::of_stdout(None);
+    let command = groups::grouped(fit(Arguments::command(), page), page);
     let parsed = command.try_get_matches().and_then(|matches| Arguments::from_arg_matches(&matches));
     parsed.map_err(|mut answer| {
         suggest::suggest(&mut answer);

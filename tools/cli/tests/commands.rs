@@ -735,7 +735,7 @@ fn options(text: &str) -> Vec<&str> {
 
 /// Commands that a help text lists.
 fn commands(help: &str) -> Vec<&str> {
-    let list = help.split_once("\nCommands:\n").unwrap().1.split("\n\n").next().unwrap();
+    let list = help.split_once("\nUsage: ").unwrap().1.split_once("\nOptions:\n").unwrap().0;
     let names = list.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
     names.map(|line| line.split_whitespace().next().unwrap()).filter(|name| *name != "help").collect()
 }

@@ -129,7 +129,7 @@ fn of_program(
     } else {
         writeln!(out, "cycles on {}, whatever the inputs", program.machine.name)?;
         write_sections(program, bounds, arguments.clock, out)?;
-        write_verdict(verdict.as_ref(), arguments.clock, out)?;
+        write_verdict(verdict.as_ref(), arguments, out)?;
     }
     Ok(verdict.is_none_or(|verdict| verdict.keeps_tick()))
 }
@@ -283,7 +283,8 @@ fn write_cores(description: &Description, bounds: &[Bounds], clock: f64, out: &m
     Ok(())
 }
 
-fn write_verdict(verdict: Option<&Verdict>, clock: f64, out: &mut Out) -> Result<()> {
+fn write_verdict(verdict: Option<&Verdict>, arguments: &Bound, out: &mut Out) -> Result<()> {
+    let clock = arguments.clock;
     if let Some(verdict) = verdict {
         let Verdict { deadline, worst } = *verdict;
         let time = microseconds(deadline, clock);
@@ -293,8 +294,14 @@ fn write_verdict(verdict: Option<&Verdict>, clock: f64, out: &mut Out) -> Result
             out.lines(&format!("deadline of {deadline} cycles ({time} at {clock} MHz): {kept}\n"))?;
         } else {
             let kept = out.page().strong("not kept");
+            // Who means a time writes its unit; a number alone is one of cycles.
+            let hint = match arguments.deadline {
+                Some(Time::Cycles(count)) => format!("; for a time, write its unit: `{count}us`"),
+                _ => String::new(),
+            };
+            let cycles = if deadline == 1 { "cycle" } else { "cycles" };
             out.lines(&format!(
-                "deadline of {deadline} cycles ({time} at {clock} MHz): {kept}, a period can take {worst} and \
+                "deadline of {deadline} {cycles} ({time} at {clock} MHz{hint}): {kept}, a period can take {worst} and \
                  must take fewer than {deadline}\n"
             ))?;
         }

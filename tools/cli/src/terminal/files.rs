@@ -8,7 +8,11 @@ use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
+use takt_asm::nearest;
 use takt_isa::text::visible;
+
+/// Folder of the shipped examples, from the top of the sources.
+const EXAMPLES: &str = "programs/examples";
 
 /// The path denotes standard input or output.
 pub(crate) fn is_dash(path: &Path) -> bool {
@@ -25,12 +29,38 @@ pub(crate) fn input_name(path: &Path) -> String {
     if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
 }
 
+/// Suffix for the message about a file that is not there: one of a similar name in the folder, the shipped example of the name, or where
+/// it was looked for.
+fn near(path: &Path) -> String {
+    if path.exists() {
+        return String::new();
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let Some(wanted) = path.file_name() else { return String::new() };
+    let Ok(entries) = fs::read_dir(folder) else {
+        return format!(": there is no folder {}", folder.display());
+    };
+    let names: Vec<String> =
+        entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    let alike = nearest(&wanted.to_string_lossy(), names.iter().map(String::as_str));
+    let alike = alike.map(|name| path.with_file_name(name));
+    let example = Path::new(EXAMPLES).join(wanted);
+    let mut examples = [example.clone(), example.with_extension("s")].into_iter();
+    match alike.or_else(|| examples.find(|example| example.exists())) {
+        Some(meant) => format!("; did you mean `{}`?", meant.display()),
+        None => {
+            let here = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
+            format!(" in {}", here.display())
+        }
+    }
+}
+
 /// Opens an input file.
 pub(crate) fn open(path: &Path) -> Result<Box<dyn Read>> {
     if is_dash(path) {
         return Ok(Box::new(io::stdin().lock()));
     }
-    let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
+    let file = File::open(path).with_context(|| format!("cannot open {}{}", path.display(), near(path)))?;
     if file.metadata().is_ok_and(|about| about.is_dir()) {
         bail!("{} is a folder, not a file", path.display());
     }

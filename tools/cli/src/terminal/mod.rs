@@ -2,6 +2,7 @@
 //! Command line and terminal: options, numbers, files, messages, progress, plots.
 
 pub(crate) mod files;
+pub(crate) mod groups;
 pub(crate) mod history;
 pub(crate) mod interrupt;
 pub(crate) mod number;
