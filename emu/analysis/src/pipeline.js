@@ -2,8 +2,8 @@
 // Time goes across, operations go down in the order of issue. Only what is in sight is drawn, so that long traces scroll.
 
 const NS = "http://www.w3.org/2000/svg";
-/** Pixels of a row, of the axis, the least and the largest of a column, before the first. */
-const ROW = 18, AXIS = 22, NARROW = 1.5, WIDE = 48, GAP = 6;
+/** Pixels of a row at least and, where few rows leave room, at most; of the axis, the least and the largest of a column, before the first. */
+const ROW = 18, TALL = 30, AXIS = 22, NARROW = 1.5, WIDE = 48, GAP = 6;
 /** Rows that are drawn beyond the edges. */
 const BEYOND = 3;
 /**
@@ -127,7 +127,7 @@ export class Pipeline {
    * @param reveal called with an operation whose line is to be shown
    */
   constructor(parent, reveal) {
-    Object.assign(this, { parent, reveal, width: 10, rows: [], stretches: [], chain: [], first: [], columns: 0, longest: 0, marked: new Set(), follows: true });
+    Object.assign(this, { parent, reveal, width: 10, row: ROW, fits: "new", rows: [], stretches: [], chain: [], first: [], columns: 0, longest: 0, marked: new Set(), follows: true });
     this.legend = node("div", { class: "tp-legend" });
     const button = (text, title, act) => node("button", { type: "button", text, title, "aria-label": title, onclick: act });
     this.tools = node("div", { class: "tp-tools", role: "toolbar", "aria-label": "Zoom" },
@@ -226,7 +226,7 @@ export class Pipeline {
 
   /** Of all rows one is a stop of the tab key, the one that was there last if it is in sight: arrows go on to the others. */
   tabStop() {
-    const rows = [...this.labels.children], top = Math.ceil(this.scroll.scrollTop / ROW);
+    const rows = [...this.labels.children], top = Math.ceil(this.scroll.scrollTop / this.row);
     const stop = rows.find((one) => Number(one.dataset.row) === this.at) ?? rows.find((one) => Number(one.dataset.row) >= top);
     for (const one of rows) one.tabIndex = one === stop ? 0 : -1;
   }
@@ -276,7 +276,7 @@ export class Pipeline {
     if (!before || before.bundles.length !== data?.bundles.length) {
       Object.assign(this.scroll, { scrollLeft: 0, scrollTop: 0 });
       this.follows = true;
-      this.width = 0;
+      this.fits = "new";
       this.at = undefined;
     }
     this.resize();
@@ -339,28 +339,29 @@ export class Pipeline {
 
   /** Brings a row into sight. */
   into(index) {
-    const { scroll } = this, y = index * ROW, x = this.rows[index].column * this.width;
+    const { scroll } = this, y = index * this.row, x = this.rows[index].column * this.width;
     const tall = scroll.clientHeight - AXIS, wide = scroll.clientWidth - this.labelWidth;
-    if (y < scroll.scrollTop || y > scroll.scrollTop + tall - 2 * ROW) scroll.scrollTop = Math.max(0, y - tall / 3);
+    if (y < scroll.scrollTop || y > scroll.scrollTop + tall - 2 * this.row) scroll.scrollTop = Math.max(0, y - tall / 3);
     if (x < scroll.scrollLeft || x > scroll.scrollLeft + wide - 4 * this.width) scroll.scrollLeft = Math.max(0, x - wide / 3);
     this.paint();
   }
 
   toDiagonal() {
-    const row = this.rows[Math.floor(this.scroll.scrollTop / ROW)];
+    const row = this.rows[Math.floor(this.scroll.scrollTop / this.row)];
     if (row) this.scroll.scrollLeft = Math.max(0, row.column * this.width - 40);
   }
 
   zoom(factor, at = (this.scroll.clientWidth - this.labelWidth) / 3) {
     const cycle = (this.scroll.scrollLeft + at) / this.width;
     this.width = Math.min(WIDE, Math.max(NARROW, this.width * factor));
+    this.fits = "";
     this.resize();
     this.scroll.scrollLeft = cycle * this.width - at;
     this.paint();
   }
 
   fit() {
-    this.width = Math.min(WIDE, Math.max(NARROW, (this.scroll.clientWidth - this.labelWidth - 24) / Math.max(1, this.columns)));
+    this.fits = "all";
     this.resize();
   }
 
@@ -369,10 +370,13 @@ export class Pipeline {
     if (!scroll.clientWidth) return;
     // As wide as the longest label asks for, but no wider than leaves the chart its room.
     this.labelWidth = Math.round(Math.min(this.longest * 7.3 + 18, 430, 0.42 * scroll.clientWidth));
-    // A new picture fills the width, as far as its columns can be told apart and are no bars.
-    if (!this.width) this.width = Math.min(20, Math.max(7, (scroll.clientWidth - this.labelWidth - 4 * GAP) / Math.max(1, this.columns)));
+    // Until somebody zooms, the picture follows the size: a new one fills the width, as far as its columns can be told apart and are no bars.
+    const [least, most] = { new: [7, 20], all: [NARROW, WIDE] }[this.fits] ?? [this.width, this.width];
+    this.width = Math.min(most, Math.max(least, (scroll.clientWidth - this.labelWidth - 4 * GAP) / Math.max(1, this.columns)));
+    this.row = Math.floor(Math.min(TALL, Math.max(ROW, (scroll.clientHeight - AXIS - 8) / Math.max(1, this.rows.length))));
+    this.parent.style.setProperty("--row", `${this.row}px`);
     sizer.style.width = `${this.labelWidth + this.columns * this.width + 24}px`;
-    sizer.style.height = `${AXIS + this.rows.length * ROW + 8}px`;
+    sizer.style.height = `${AXIS + this.rows.length * this.row + 8}px`;
     this.paint();
   }
 
@@ -384,8 +388,8 @@ export class Pipeline {
     view.style.height = `${tall}px`;
     labels.style.width = this.corner.style.width = `${this.labelWidth}px`;
     const left = scroll.scrollLeft, top = scroll.scrollTop;
-    const from = Math.max(0, Math.floor(top / ROW) - BEYOND), to = Math.min(rows.length, Math.ceil((top + tall) / ROW) + BEYOND);
-    const x = (column) => this.labelWidth + GAP + column * w - left, y = (row) => AXIS + row * ROW - top;
+    const from = Math.max(0, Math.floor(top / this.row) - BEYOND), to = Math.min(rows.length, Math.ceil((top + tall) / this.row) + BEYOND);
+    const x = (column) => this.labelWidth + GAP + column * w - left, y = (row) => AXIS + row * this.row - top;
     const [low, high] = [Math.floor(left / w) - 1, Math.ceil((left + wide) / w) + 1];
     for (const one of [svg, axis]) one.replaceChildren();
     svg.setAttribute("width", wide);
@@ -407,7 +411,7 @@ export class Pipeline {
     if (focused !== undefined) labels.querySelector(`[data-row="${focused}"]`)?.focus({ preventScroll: true });
     for (const link of this.chain) {
       if (Math.max(link.from, link.to) < from || Math.min(link.from, link.to) > to) continue;
-      const [x1, y1, x2, y2] = [x(rows[link.from].column) + w / 2, y(link.from) + ROW / 2, x(rows[link.to].column) + w / 2, y(link.to) + ROW / 2];
+      const [x1, y1, x2, y2] = [x(rows[link.from].column) + w / 2, y(link.from) + this.row / 2, x(rows[link.to].column) + w / 2, y(link.to) + this.row / 2];
       const path = shape("path", { class: "tp-link", d: `M${x1} ${y1} H${x2} V${y2}` });
       path.dataset.tip = link.tip;
       svg.append(path);
@@ -438,12 +442,12 @@ export class Pipeline {
 
   paintRow(i, x, y) {
     const { svg, width: w } = this, row = this.rows[i], { bundle, operation, column } = row, top = y(i);
-    if (this.marked.has(i)) svg.append(shape("rect", { class: "tp-band", x: 0, width: "100%", y: top, height: ROW }));
+    if (this.marked.has(i)) svg.append(shape("rect", { class: "tp-band", x: 0, width: "100%", y: top, height: this.row }));
     if (row.first) {
       let at = column;
       for (const stall of [...bundle.stalls].reverse()) {
         at -= stall.cycles;
-        const box = shape("rect", { class: `tp-stall tp-k-${stall.cause.replace(" ", "-")}`, x: x(at), y: top + 5, width: stall.cycles * w, height: ROW - 10 });
+        const box = shape("rect", { class: `tp-stall tp-k-${stall.cause.replace(" ", "-")}`, x: x(at), y: top + 5, width: stall.cycles * w, height: this.row - 10 });
         box.dataset.tip = `${plural(stall.cycles, "cycle")} lost before cycle ${bundle.cycle}: ${KINDS[stall.cause] ?? stall.cause}\n${stall.text}`;
         svg.append(box);
       }
@@ -451,9 +455,9 @@ export class Pipeline {
     const group = shape("g", { class: operation ? "tp-operation" : "tp-idle", "data-row": i });
     if (operation) group.style.setProperty("--fill", this.colours.get(operation.unit));
     const latency = operation?.latency ?? 1;
-    if (latency > 1) group.append(shape("rect", { class: "tp-run", x: x(column + 1), y: top + 4, width: (latency - 1) * w, height: ROW - 8 }));
-    group.append(shape("rect", { class: "tp-issue", x: x(column), y: top + 2, width: Math.max(w, 2), height: ROW - 4, rx: 1 }));
-    if (operation?.critical) group.append(shape("rect", { class: "tp-critical", x: x(column) - 0.5, y: top + 1.5, width: Math.max(w, 2) + 1, height: ROW - 3, rx: 1.5 }));
+    if (latency > 1) group.append(shape("rect", { class: "tp-run", x: x(column + 1), y: top + 4, width: (latency - 1) * w, height: this.row - 8 }));
+    group.append(shape("rect", { class: "tp-issue", x: x(column), y: top + 2, width: Math.max(w, 2), height: this.row - 4, rx: 1 }));
+    if (operation?.critical) group.append(shape("rect", { class: "tp-critical", x: x(column) - 0.5, y: top + 1.5, width: Math.max(w, 2) + 1, height: this.row - 3, rx: 1.5 }));
     svg.append(group);
   }
 

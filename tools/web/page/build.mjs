@@ -6,10 +6,12 @@ import { join, relative, resolve } from "node:path";
 import { promisify } from "node:util";
 import { gzipSync } from "node:zlib";
 import { asking } from "./ask.mjs";
-import { PERIODS, collect, shipped } from "./src/collect.js";
+import { PERIODS, WHICH, collect, shipped } from "./src/collect.js";
 
 const [wasm, out] = process.argv.slice(2).map((path) => resolve(path));
 const page = import.meta.dirname;
+/** Periods of a drive in a call, and digits of a pose that is drawn. */
+const SLICE = 20_000, DIGITS = 7;
 mkdirSync(out, { recursive: true });
 rmSync(join(out, "parts"), { recursive: true, force: true });
 const { metafile } = await build({
@@ -30,21 +32,34 @@ const weigh = (name) => {
   console.log(`${name.padEnd(26)} ${String(bytes.length).padStart(9)} bytes, ${String(size).padStart(9)} compressed`);
   return size;
 };
-let total = [...first].reduce((sum, name) => sum + weigh(name), 0);
+let total = [...first].reduce((sum, name) => sum + weigh(name), 0), screen = total;
 console.log(`${"first screen".padEnd(26)} ${" ".repeat(16)} ${String(total).padStart(9)} compressed`);
 /** Bytes of the first screen, and of all that is loaded when asked for. */
 const LIMIT = 2_000_000, ALL = 4_000_000;
 if (total >= LIMIT) fail(`the page has ${total} bytes compressed; it may have ${LIMIT}`);
 total += [...outputs.keys()].filter((name) => !first.has(name)).reduce((sum, name) => sum + weigh(name), 0);
-// Results of the examples that take long to assemble, so that their curves are there at once.
+// Results of the examples, and a drive of the robot, so that no panel waits for the machine in the browser.
 mkdirSync(join(out, "ahead"), { recursive: true });
 const call = await asking(readFileSync(wasm));
-for (const example of call("about").examples.filter(({ seconds }) => seconds)) {
-  const asked = shipped(example, PERIODS), program = call("assemble", asked);
-  const bytes = gzipSync(JSON.stringify({ asked, program: { ...program, view: null }, run: await collect(call, asked.periods) }), { level: 9 });
-  writeFileSync(join(out, `ahead/${example.name}.json.gz`), bytes);
+const { examples } = call("about");
+const ahead = (name, data) => {
+  const bytes = gzipSync(JSON.stringify(data), { level: 9 });
+  writeFileSync(join(out, `ahead/${name}.json.gz`), bytes);
   total += bytes.length;
-  console.log(`ahead/${example.name}.json.gz: ${bytes.length} bytes`);
+  if (name === examples[0].name && (screen += bytes.length) >= LIMIT) fail(`the page has ${screen} bytes compressed with its first example; it may have ${LIMIT}`);
+  console.log(`${`ahead/${name}.json.gz`.padEnd(26)} ${" ".repeat(16)} ${String(bytes.length).padStart(9)} compressed`);
+};
+for (const example of examples) {
+  const asked = shipped(example, PERIODS), program = call("assemble", asked), run = await collect(call, asked.periods);
+  ahead(example.name, { program, run, bundles: call("bundles"), picture: call("picture", { period: Math.min(WHICH, run.cycles.length) }) });
+  if (!example.track) continue;
+  const poses = [];
+  let part = call("track", { begin: true, periods: SLICE });
+  for (; ; part = call("track", { periods: SLICE })) {
+    poses.push(...part.poses.map((pose) => pose.map((value) => Number(value.toPrecision(DIGITS)))));
+    if (part.over) break;
+  }
+  ahead("drive", { ...part, poses });
 }
 if (total >= ALL) fail(`the page and all that it loads have ${total} bytes compressed; they may have ${ALL}`);
 

@@ -9,7 +9,7 @@ const [WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [440, 440, 40, 12, 232, 34];
 /** Seconds of the whole, until the first curve is there, and in which the slider moves. */
 const [WHOLE, DRAWN, MOVES, RESTS] = [10, 3, 4.5, 8];
 /** The gain that moves, its values, and the periods that are shown, of which every second is drawn. */
-const [GAIN, VALUES, PERIODS] = ["ki", [4, 7, 12, 18, 25, 19, 13, 9, 6.5], 300];
+const [GAIN, VALUES, PERIODS] = ["ki", [4, 7, 12, 18, 25, 19, 13, 9, 6.5], 200];
 const CLOCK = 125;
 
 const [wasm, out] = process.argv.slice(2);
@@ -56,7 +56,7 @@ const parts = [
   }),
   text(16, 214, "w, rad/s", { class: "b" }), text(78, 214, "from a motor that is loaded after 0.1 s; dotted: w_ref", { class: "d" }),
   ...[0, 25, 50, 75, 100].flatMap((level) => [put("path", { d: `M${LEFT} ${y(level).toFixed(1)}H${WIDTH - RIGHT}`, stroke: "#e3e8ef" }), text(LEFT - 6, (y(level) + 4).toFixed(1), String(level), { class: "d", "text-anchor": "end" })]),
-  ...[0, 100, 200, 300].map((period) => text(x(Math.min(period, PERIODS - 1)).toFixed(1), HEIGHT - 12, period === 300 ? "0.3 s" : `${period / 1000}`, { class: "d", "text-anchor": period === 300 ? "end" : "middle" })),
+  ...[0, 50, 100, 150, 200].map((period) => text(x(Math.min(period, PERIODS - 1)).toFixed(1), HEIGHT - 12, period === 200 ? "0.2 s" : `${period / 1000}`, { class: "d", "text-anchor": period === 200 ? "end" : "middle" })),
   put("path", { d: reference, class: "c", stroke: "#2f6fbf", "stroke-dasharray": "2 3" }),
   put("path", { d: curves[0], class: "c", stroke: "#2f6fbf66" }, animate("visibility", [0, MOVES, WHOLE], ["hidden", "visible", "visible"], { calcMode: "discrete" })),
   put("clipPath", { id: "c" }, put("rect", { x: LEFT, y: TOP - 8, width: WIDTH - LEFT - RIGHT, height: HEIGHT - TOP }, animate("width", [0, DRAWN, WHOLE], [0, WIDTH - LEFT - RIGHT, WIDTH - LEFT - RIGHT]))),

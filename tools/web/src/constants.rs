@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Constants of the page's source that can be set while watching the plots: each `.const` whose value stands in the text itself. Constants
-//! that are computed from others follow them.
+//! Constants of the page's source that can be set while watching the plots: each `.const` whose value stands in the text itself, but no
+//! sampling period, which a plant and a host share, and no count, on which arrays and loops depend. Constants that are computed from others
+//! follow them.
 
 use serde_json::{Value, json};
 use std::collections::{HashMap, HashSet};
@@ -15,8 +16,7 @@ use takt_syntax::intern::Interner;
 /// Maximum number of constants that are offered.
 const MOST: usize = 60;
 
-/// Settable constants in source order: name, value, and place of the value's text, in UTF-16 units as JavaScript counts them. `whole`: an
-/// integer without a unit, such as a number of elements.
+/// Settable constants in source order: name, value, and place of the value's text, in UTF-16 units as JavaScript counts them.
 pub(crate) fn settable(assembled: &AssembledProgram) -> Vec<Value> {
     let Some(source) = assembled.sources.files().first() else { return Vec::new() };
     let mut names = Interner::new();
@@ -36,11 +36,15 @@ pub(crate) fn settable(assembled: &AssembledProgram) -> Vec<Value> {
         let end = (value.span.end - source.base) as usize;
         let comment = comment_after(source, end);
         let unit = comment.and_then(units::leading_unit);
-        let whole = matches!(number, Number::Int(_)) && unit.is_none();
+        // A number of elements has no unit.
+        let is_count = matches!(number, Number::Int(_)) && unit.is_none();
+        if is_count || units::PERIODS.contains(&(name, unit.as_deref().unwrap_or_default())) {
+            return None;
+        }
         let from = offsets.units_at(start);
         let to = offsets.units_at(end);
         Some(json!({
-            "name": name, "value": number.real(), "integer": matches!(number, Number::Int(_)), "whole": whole,
+            "name": name, "value": number.real(), "integer": matches!(number, Number::Int(_)),
             "from": from, "to": to, "unit": unit, "text": comment,
         }))
     };

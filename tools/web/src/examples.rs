@@ -10,8 +10,15 @@ use takt_programs::{EXAMPLES, SOURCES, title};
 
 /// Examples from `programs/examples` that come first in the list, in this order; all others follow.
 const FIRST: [&str; 5] = ["pi.s", "gains.s", "pendulum.s", "foc.s", "blink.s"];
-/// Number of periods after which an example without inputs shows an effect.
-const PERIODS_OF: [(&str, usize); 2] = [("blink.s", 2000), ("pendulum.s", 6000)];
+/// Number of periods in which an example without a table shows what it does.
+const PERIODS_OF: [(&str, usize); 6] = [
+    ("blink.s", 2000),
+    ("foc.s", 320),
+    ("foc_early.s", 320),
+    ("gains.s", 400),
+    ("pendulum.s", 6000),
+    ("pi.s", 400),
+];
 /// Seconds that assembling takes in a browser, for the page to announce until it has measured them.
 const SECONDS_OF: [(&str, u32); 2] = [("tracking.s", 3), ("statespace.s", 2)];
 /// Plants that close the loops of examples: files of [`takt_programs::PLANTS`], without the extension.
@@ -22,9 +29,9 @@ const PLANT_OF: [(&str, &str); 5] = [
     ("pendulum.s", "cart_pendulum"),
     ("pi.s", "dc_motor"),
 ];
-/// Tables of inputs that do not have their example's name; without a table, the plant's file has the inputs that the plant leaves.
-const INPUTS_OF: [(&str, Option<&str>); 3] =
-    [("foc_early.s", Some("foc.csv")), ("gains.s", Some("pi.csv")), ("pendulum.s", None)];
+/// Ports that are plotted first, where these are not outputs with their references.
+const PLOTTED: [&str; 8] = ["da", "db", "dc", "id", "iq", "id_ref", "iq_ref", "we"];
+const PLOTTED_OF: [(&str, &[&str]); 2] = [("foc.s", &PLOTTED), ("foc_early.s", &PLOTTED)];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 
@@ -60,16 +67,16 @@ pub(crate) fn about() -> Value {
         EXAMPLES.iter().map(|(name, _)| *name).filter(|name| name.ends_with(".s") && !FIRST.contains(name));
     let seconds =
         |name: &str| SECONDS_OF.iter().find(|(known, _)| *known == name).map(|(_, seconds)| seconds);
-    let plant = |name: &str| {
-        PLANT_OF.iter().find(|(known, _)| *known == name).map(|(_, plant)| json!({ "name": plant }))
-    };
+    let plant = |name: &str| PLANT_OF.iter().find(|(known, _)| *known == name).map(|(_, plant)| *plant);
+    let plotted = |name: &str| PLOTTED_OF.iter().find(|(known, _)| *known == name).map(|(_, ports)| *ports);
     let example = |name: &str| {
         let source = text(name)?;
-        let table = INPUTS_OF.iter().find(|(known, _)| *known == name).map(|(_, table)| *table);
-        let inputs = table.unwrap_or(Some(&name.replace(".s", ".csv"))).and_then(text);
+        // The file of a plant has the inputs that the plant leaves; a recorded table would have columns that nobody reads.
+        let plant = plant(name);
+        let inputs = if plant.is_some() { None } else { text(&name.replace(".s", ".csv")) };
         let periods = PERIODS_OF.iter().find(|(known, _)| *known == name).map(|(_, periods)| periods);
         Some(
-            json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "plant": plant(name), "track": false }),
+            json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "plant": plant.map(|plant| json!({ "name": plant })), "plotted": plotted(name), "track": false }),
         )
     };
     let mut examples: Vec<Value> = FIRST.into_iter().chain(rest).filter_map(example).collect();

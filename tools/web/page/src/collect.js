@@ -23,3 +23,6 @@ export const shipped = ({ name, source, inputs, plant, periods }, usual) => ({
 
 /** Default number of periods of a program without inputs. */
 export const PERIODS = 20;
+
+/** Period whose pipeline is drawn first: the one after the first, which may have waited. */
+export const WHICH = 2;

@@ -71,11 +71,12 @@ export class Documents {
   }
 
   /**
-   * Document for a program from a link or an example: an unchanged one from the same origin, otherwise a new one. `from` is `link` or
-   * `example`; `key` identifies the origin.
+   * Document for a program from a link or an example: an unchanged one from the same origin, for an example also that of another example
+   * which nobody changed, otherwise a new one. `from` is `link` or `example`; `key` identifies the origin.
    */
   open({ name, machine, source, inputs, periods, plant, parameters, changes }, from, key) {
-    const known = this.list().find((document) => document.key === key && !document.changed);
+    const idle = this.list().filter((document) => !document.changed);
+    const known = idle.find((document) => document.key === key) ?? (from === "example" ? idle.find((document) => document.from === from) : undefined);
     const document = { id: known?.id ?? `${Date.now()}-${Math.random().toString(36).slice(2)}`, made: known?.made ?? Date.now(), name: name || "main.s", machine: machine || "", source, inputs: inputs ?? "", periods, plant: plant ?? null, parameters: parameters ?? {}, changes: changes ?? [], from, key, changed: false };
     this.use(document);
     this.forget(document.id);

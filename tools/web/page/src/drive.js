@@ -1,9 +1,13 @@
 // Robot panel: drives the robot along the path with the program, and replays the drive.
 import { chart } from "./plot.js";
 import { Robot } from "./robot.js";
+import { fetched } from "./thread.js";
 
 const el = (id) => document.getElementById(id);
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
+/** The build's drive along the path, once it is asked for. */
+let ahead;
+const prepared = () => (ahead ??= fetched("ahead/drive.json.gz").then((bytes) => JSON.parse(new TextDecoder().decode(bytes))));
 /** Number of periods per call. */
 const PERIODS = 2000;
 /** Tool error that the founding paper permits while cutting, µm. */
@@ -42,6 +46,7 @@ export class Drive {
   set fits(on) {
     if (!this.idle) return;
     el("drive").disabled = el("scene").hidden = !on;
+    if (on) this.prepare(false);
     el("drove").replaceChildren(on ? "The program as the controller of the five-axis hybrid robot, in a closed loop." : "This program has other ports than a controller of the five-axis hybrid robot. The example ");
     if (!on) el("drove").append(Object.assign(document.createElement("a"), { href: "#example=tracking.s", textContent: "tracking.s" }), " is one.");
   }
@@ -62,6 +67,25 @@ export class Drive {
     el("robot").classList.remove("old");
   }
 
+  /** Shows path and robot before a drive; with `whole`, the build's drive, which this program on this machine repeats. */
+  async prepare(whole) {
+    const mine = this.drives;
+    try {
+      const drive = await prepared();
+      if (mine !== this.drives || !this.idle) return;
+      this.robot.begin(drive.base, drive.sample_time, drive.poses);
+      if (!whole) return this.robot.draw();
+      this.tried = true;
+      el("drive").disabled = el("scene").hidden = false;
+      this.starts();
+      this.robot.add(drive.poses);
+      this.tells(drive, "driven when this page was built");
+      this.ends();
+    } catch {
+      // The page's folder lacks the file: the robot is there once it is driven.
+    }
+  }
+
   play() {
     const { robot } = this;
     if (!robot.playing && robot.over && robot.shown >= robot.poses.length - 1) robot.show(0);
@@ -78,7 +102,10 @@ export class Drive {
     if (this.idle) el("drove").textContent = "The drive begins as soon as the program is assembled.";
     return this.work(async () => {
       if (!(await this.current())) return;
+      const { base, sampleTime, plan } = this.robot;
       this.clear();
+      this.robot.begin(base, sampleTime, plan);
+      this.robot.draw();
       el("drove").textContent = "The robot starts …";
       this.driving = this.tried = true;
       const mine = this.drives;
@@ -97,22 +124,35 @@ export class Drive {
       const part = await this.machine.call("track", { begin, periods: PERIODS });
       if (mine !== this.drives) return;
       if (begin) {
-        robot.begin(part.base, part.sample_time);
-        robot.over = false;
-        robot.play(true);
-        el("play").hidden = false;
-        el("play").textContent = "Pause";
-        el("time").disabled = false;
+        robot.begin(part.base, part.sample_time, robot.plan);
+        this.starts();
       }
       robot.add(part.poses);
-      el("time").max = robot.poses.length - 1;
       over = part.over;
       const seconds = (performance.now() - begun) / 1000;
       el("robot-fault").textContent = part.fault ?? "";
-      el("drove").textContent = `${(part.done * part.sample_time).toFixed(1)} s of ${(part.all * part.sample_time).toFixed(1)} s of path; ${plural(part.cycles, "cycle")} a period, ${part.longest} at most; largest tool error ${(part.cutting * 1e6).toFixed(2)} µm cutting, ${(part.overall * 1e6).toFixed(2)} µm overall; ${(part.operations / seconds / 1e6).toFixed(1)} million operations/s here`;
+      this.tells(part, `${(part.operations / seconds / 1e6).toFixed(1)} million operations/s here`);
     }
+    this.ends();
+  }
+
+  starts() {
+    this.robot.over = false;
+    this.robot.play(true);
+    el("play").hidden = false;
+    el("play").textContent = "Pause";
+    el("time").disabled = false;
+  }
+
+  /** Tells how far the drive is, and its figures. */
+  tells(part, more) {
+    el("time").max = this.robot.poses.length - 1;
+    el("drove").textContent = `${(part.done * part.sample_time).toFixed(1)} s of ${(part.all * part.sample_time).toFixed(1)} s of path; ${plural(part.cycles, "cycle")} a period, ${part.longest} at most; largest tool error ${(part.cutting * 1e6).toFixed(2)} µm cutting, ${(part.overall * 1e6).toFixed(2)} µm overall; ${more}`;
+  }
+
+  ends() {
+    const { robot } = this, { poses } = robot;
     robot.over = true;
-    const { poses } = robot;
     this.error = chart(el("error-chart"), {
       x: poses.map((pose) => pose[0] * robot.sampleTime), name: "time", label: "time", unit: "s", height: () => 150, lines: [{ at: LIMIT, text: `${LIMIT} µm` }],
       curves: [{ name: "tool error", unit: "µm", values: poses.map((pose) => pose[6] * 1e6) }], picked: (index) => (robot.play(false), (el("play").textContent = "Play"), robot.show(index)),

@@ -12,6 +12,7 @@ import {
 import {
   LSPClient, LSPPlugin, findReferencesKeymap, formatKeymap, hoverTooltips, jumpToDefinitionKeymap, renameKeymap, serverCompletion,
 } from "@codemirror/lsp-client";
+import { REPLACED, Stopped } from "./thread.js";
 
 /** Pauses of the user after which the program is read, and after which it is scheduled; ms. */
 const PAUSE = 60, LONG_PAUSE = 350;
@@ -271,13 +272,24 @@ export class Editor {
   close() {
     clearTimeout(this.pause);
     clearTimeout(this.longPause);
+    // What the server still does is about the text before, and the next text would wait for it.
+    if (this.thread.busy) this.thread.stop(REPLACED);
     if (!this.client) return;
     this.view.dispatch({ effects: [this.server.reconfigure([]), setColours.of(Decoration.none), setHints.of(Decoration.none)] });
     this.client.disconnect();
     this.client = null;
   }
 
+  /** Connects to the server; nothing is said of a connection that another one replaces. */
   async connect() {
+    try {
+      await this.connected();
+    } catch (error) {
+      if (!(error instanceof Stopped)) this.told(error.message);
+    }
+  }
+
+  async connected() {
     const client = new LSPClient({
       timeout: LANGUAGE_LIMIT,
       notificationHandlers: {
@@ -303,7 +315,11 @@ export class Editor {
       subscribe: (handler) => this.handlers.add(handler),
       unsubscribe: (handler) => this.handlers.delete(handler),
     });
-    await client.initializing;
+    try {
+      await client.initializing;
+    } catch (error) {
+      if (this.client === client) throw error;
+    }
     if (this.client !== client) return;
     this.view.dispatch({ effects: this.server.reconfigure(client.plugin(this.name, "takt")) });
     await this.read();

@@ -1,13 +1,13 @@
 import { Pipeline } from "../../../../emu/analysis/src/pipeline.js";
 import "../../../../emu/analysis/src/pipeline.css";
-import { PERIODS, collect } from "./collect.js";
+import { PERIODS, WHICH, collect, shipped } from "./collect.js";
 import { Documents } from "./documents.js";
 import { Drive } from "./drive.js";
 import { Editor, reader } from "./editor.js";
 import { LINK_CHARACTERS, pack, unpack } from "./link.js";
 import { Plots } from "./plot.js";
 import { save, short } from "./parts.js";
-import { Stopped, Thread, fetched, load } from "./thread.js";
+import { REPLACED, Stopped, Thread, fetched, load } from "./thread.js";
 import { Tuning } from "./tuning.js";
 import "./style.css";
 
@@ -20,10 +20,8 @@ const PAUSE = 400, SOON = 1000;
 const LATE = 400;
 /** Clock in MHz at which times are stated, as everywhere in Takt's documents. */
 const CLOCK = 125;
-/** Reason given for stopping a worker when another program is opened. */
-const REPLACED = "another program was opened";
 
-const state = { works: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null, took: 0, document: null };
+const state = { works: 0, opens: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null, took: 0, document: null };
 let machine, editor, plots, pipeline, drive, documents, tuning, parameters, plant, module;
 /** Panels that are loaded when they are asked for, and the worker of the program that the comparison is with. */
 let code, picture, comparison, other;
@@ -72,6 +70,7 @@ function select(name, focus) {
   // Until somebody steps, the debugger's position is nothing to look at.
   if (name === "step" || name === "code") document.body.classList.add("steps");
   if (name === "plot") plots.draw();
+  if (name === "step") light();
   if (name === "robot") {
     drive.draw();
     driveFirst();
@@ -89,7 +88,9 @@ function dimPipeline() {
 /** Draws the diagram if it is visible and outdated. */
 function pipelineInStep() {
   dimPipeline();
-  if (state.drawn !== state.program && state.tab === "pipeline" && !state.stale && state.program?.assembled && !state.program.inputs_error) draw();
+  if (state.drawn === state.program || state.tab !== "pipeline" || state.stale || !state.program?.assembled || state.program.inputs_error) return;
+  if (state.ahead) drawAhead();
+  else draw();
 }
 
 /** Shows the bundles if their panel is visible, and colours the lines of the text as them. */
@@ -102,9 +103,15 @@ async function codeInStep() {
     code.mark(editor.line);
     return;
   }
-  const { Code } = await import("./code.js");
-  code ??= new Code(el("code"), { reveal, paint: (hues) => editor.paint(hues) });
-  const bundles = await machine.call("bundles");
+  let bundles;
+  try {
+    const { Code } = await import("./code.js");
+    code ??= new Code(el("code"), { reveal, paint: (hues) => editor.paint(hues) });
+    bundles = state.ahead ? state.ahead.bundles : await machine.call("bundles");
+  } catch (error) {
+    if (!(error instanceof Stopped)) notice(error.message);
+    return;
+  }
   if (!isHere()) return;
   code.show(bundles, state.name);
   state.coded = program;
@@ -115,7 +122,7 @@ async function codeInStep() {
 
 /** Lights up the picture of the machine at the debugger's position, if it is open. */
 async function light() {
-  if (!el("machine-box").open || !state.program?.view) return;
+  if (!el("machine-box").open || state.tab !== "step" || !state.program?.view || state.ahead) return;
   const { MachinePicture } = await import("./machine.js");
   picture ??= new MachinePicture(el("machine-picture"));
   try {
@@ -264,6 +271,7 @@ function useMachine() {
 }
 
 async function open({ name, source, inputs, periods, plant, parameters, changes, machine: wanted }) {
+  state.opens++;
   if (machine.busy) machine.stop(REPLACED);
   clearTimeout(state.soon);
   state.opening = true;
@@ -288,9 +296,13 @@ async function open({ name, source, inputs, periods, plant, parameters, changes,
   state.kept = null;
   showSides();
   empty();
+  if (state.about.examples.some((one) => one.track && isShipped(one, state.opened))) drive.prepare(true);
   await assemble();
   await opened;
 }
+
+/** Whether an example is asked for as it is shipped, so that the build's results of it hold. */
+const isShipped = (example, wanted) => JSON.stringify(shipped(example, PERIODS)) === JSON.stringify(wanted);
 
 /** Empties all panels until the result of the opened text is there. */
 function empty() {
@@ -308,6 +320,7 @@ function empty() {
   clearView(why);
   for (const id of ["ran", "fault", "text", "answer"]) el(id).textContent = "";
   el("cycles").replaceChildren(why);
+  el("more").hidden = true;
   el("drawn").textContent = why;
 }
 
@@ -344,6 +357,7 @@ function took(milliseconds) {
 function showCycles() {
   const { program, run } = state, out = el("cycles");
   out.replaceChildren();
+  el("more").hidden = true;
   out.classList.toggle("now", Boolean(program) && (!program.assembled || Boolean(program.inputs_error)));
   const put = (content, tag) => out.appendChild(Object.assign(document.createElement(tag ?? "span"), { textContent: content }));
   if (!program) return put("no program");
@@ -360,17 +374,22 @@ function showCycles() {
   if (run?.cycles.length) {
     const least = run.shortest, most = run.longest;
     put(least === most ? `${most.toLocaleString("en")} cycles` : `${least.toLocaleString("en")} to ${most.toLocaleString("en")} cycles`, "b");
-    put(` a period, in ${plural(run.cycles.length, "period")}${run.missed ? `, ${plural(run.missed, "deadline")} missed` : ""}`);
+    put(` a period, ${short(Number((most / CLOCK).toPrecision(3)))} µs at ${CLOCK} MHz`);
   } else put(run ? `${plural(run.total, "cycle")}` : "running …", "b");
-  const least = Math.max(...periods.map((section) => section.least ?? 0));
-  if (least > 0) put(` · no schedule takes fewer than ${least}`);
-  for (const section of periods) put(` · ${section.name} takes ${range(section.cycles)} whatever the inputs`);
-  if (once) put(` · once ${range(once.cycles)}`);
-  if (run?.cycles.length) put(` · ${run.longest.toLocaleString("en")} cycles are ${short(Number((run.longest / CLOCK).toPrecision(3)))} µs at ${CLOCK} MHz`).className = "clock";
+  const worst = Math.max(...periods.map((section) => section.cycles.worst));
+  if (worst > 0) put(` · proved: at most ${worst.toLocaleString("en")}, whatever the inputs`);
   if (program.no_bound) put(` · no bound: ${program.no_bound}`);
+  if (run?.missed) put(` · ${plural(run.missed, "deadline")} missed`, "em");
   if (program.parameter_error) put(` · parameters as in the source: ${program.parameter_error}`, "em");
   if (program.plant_error) put(` · the loop is open: ${program.plant_error}`, "em");
   if (program.inputs_of_others) put(` · all inputs are 0: ${program.inputs_of_others}`, "em");
+  const least = Math.max(...periods.map((section) => section.least ?? 0)), more = [];
+  if (run?.cycles.length) more.push(`measured in ${plural(run.cycles.length, "period")}`);
+  if (least > 0) more.push(`no schedule takes fewer than ${least} cycles`);
+  for (const section of periods) more.push(`${section.name} takes ${range(section.cycles)} whatever the inputs`);
+  if (once) more.push(`before the first period ${range(once.cycles)}`);
+  el("more").hidden = !more.length;
+  el("more-text").textContent = more.join(" · ");
 }
 
 /** Shows an assembled program. While the text has errors, results for the previous text remain, dimmed. */
@@ -385,7 +404,6 @@ function showProgram(program) {
   clearTimeout(state.dims);
   document.body.classList.toggle("stale", !whole && state.shown !== null);
   if (whole) {
-    tuning.show(program.settable);
     showParameters();
     showPlants();
   }
@@ -467,6 +485,10 @@ function showPlants() {
   el("loop").hidden = !plants.length;
   choice.replaceChildren(...plants.map(({ name, text, gives }) => new Option(`${text} gives ${gives.join(", ")}`, name)), new Option("all inputs are the table's", ""));
   choice.value = here?.name ?? "";
+  el("given").textContent = here ? `${here.text[0].toUpperCase()}${here.text.slice(1)} gives ${here.gives.join(", ")}: a table's columns of these names are not read.` : "";
+  // What the program takes the plant for stands apart from its gains, and from the plant's own numbers.
+  const own = new Set(here?.parameters.map(({ name }) => name)), isModel = ({ name }) => own.has(name), { settable } = state.program;
+  tuning.show([...settable.filter((one) => !isModel(one)), ...settable.filter(isModel).map((one) => ({ ...one, under: "what the program takes the plant for; the plant's own numbers stand below" }))]);
   plant.show((here?.parameters ?? []).map((one) => ({ ...one, value: state.plant.parameters?.[one.name] ?? one.value, integer: true })));
 }
 
@@ -482,32 +504,52 @@ function usePlant(plant, event) {
   changed(event);
 }
 
-/**
- * Shows the curves of a shipped example that takes long to assemble, from the build's run of it, which gives the same; all else waits for
- * the machine.
- */
+/** Shows a shipped example in all panels before it is assembled here, from the build's results, which are the same. */
 async function showAhead(wanted, isOver) {
-  const { works } = state, example = state.about.examples.find(({ name, seconds }) => seconds && name === wanted.name);
+  const { works } = state, example = state.about.examples.find((one) => isShipped(one, wanted));
   if (state.shown !== null || !example) return;
   try {
-    const ahead = JSON.parse(new TextDecoder().decode(await fetched(`ahead/${example.name}.json.gz`)));
-    if (isOver() || works !== state.works || state.stale || JSON.stringify(ahead.asked) !== JSON.stringify(wanted)) return;
-    Object.assign(state, { program: { ...ahead.program, blank: !wanted.inputs.trim() }, run: ahead.run, ahead: true });
-    plots.show(ahead.run, state.program);
+    const { program, run, bundles, picture } = JSON.parse(new TextDecoder().decode(await fetched(`ahead/${example.name}.json.gz`)));
+    if (isOver() || works !== state.works || state.stale) return;
+    Object.assign(state, { program: known(program, wanted), run, ahead: { bundles, picture } });
+    plots.show(run, state.program);
     showCycles();
-    el("cycles").append(` · assembling it here, to step through it …`);
+    showView(program.view);
+    const about = seconds(), later = `assembling it here${about ? `, about ${about} s` : ""} …`;
+    el("cycles").append(` · ${later}`);
+    el("head").append(` · ${later}`);
+    drawAhead();
+    codeInStep();
   } catch {
     // The page's folder lacks the file: the results come with the assembled program.
   }
 }
 
+/** A program with what the page knows: whether there is a table, and the ports that are plotted first. */
+const known = (program, wanted) => Object.assign(program, { blank: !wanted.inputs.trim(), plotted: state.about.examples.find(({ name }) => name === wanted.name)?.plotted });
+
+/** Shows the build's diagram, if it is of the period that is asked for. */
+function drawAhead() {
+  const { period, picture, cycles } = state.ahead.picture;
+  if (state.tab !== "pipeline" || el("against").value || Number(el("which").value) !== period) return;
+  showPicture(picture, period, cycles);
+  markPipeline(editor.line, false);
+}
+
 /** Assembles the program, and restores the breakpoints. */
 async function begin() {
-  const { version } = editor;
+  const { version } = editor, { opens } = state;
   const wanted = asked(), answer = machine.call("assemble", wanted);
   let over = false;
   showAhead(wanted, () => over);
-  state.program = Object.assign(await answer.finally(() => (over = true)), { blank: !wanted.inputs.trim() });
+  const program = known(await answer.finally(() => (over = true)), wanted);
+  if (opens !== state.opens) throw new Stopped(REPLACED);
+  if (state.ahead && program.assembled) {
+    // What the build has drawn is of this program.
+    if (state.drawn === state.program) state.drawn = program;
+    if (state.coded === state.program) state.coded = program;
+  }
+  state.program = program;
   if (state.program.settable) editor.know(state.program.settable, version);
   await setStops();
   showProgram(state.program);
@@ -515,14 +557,15 @@ async function begin() {
 
 /** Runs a job on the machine's worker; reports if it is stopped or fails. */
 async function work(doing) {
-  const mine = ++state.works;
+  const mine = ++state.works, { opens } = state;
   notice();
   el("stop").hidden = false;
   el("assemble").disabled = true;
   try {
     return await doing();
   } catch (error) {
-    if (error instanceof Stopped && error.message === REPLACED) return;
+    // Nothing that was asked about another program is told of this one.
+    if (opens !== state.opens || (error instanceof Stopped && error.message === REPLACED)) return;
     if (error instanceof Stopped) {
       state.stale = true;
       notice(`${error.message === "stopped" ? "Stopped." : `The machine stopped (${error.message}).`} The text is as it was; assemble again to go on.`);
@@ -570,7 +613,7 @@ async function run() {
   });
   state.run = whole;
   state.ahead = false;
-  el("which").value = Math.min(state.which ?? 2, whole.cycles.length);
+  el("which").value = Math.min(state.which ?? WHICH, whole.cycles.length);
   plots.show(whole, state.program);
   showCycles();
 }
@@ -670,13 +713,18 @@ function draw() {
     if (!(await current())) return;
     const { program } = state;
     const { picture, period, cycles } = await machine.call("picture", { period: Math.max(0, Number(el("which").value) || 0) });
-    pipeline.show(picture);
-    state.drawn = program;
-    dimPipeline();
-    el("drawn").textContent = `${picture.program} on ${picture.machine}, ${period ? `period ${period}` : "what runs once"}: ${plural(cycles, "cycle")}, ${plural(picture.bundles.length, "bundle")}`;
+    if (program !== state.program) return;
+    showPicture(picture, period, cycles);
     await compare();
     markPipeline(editor.line, false);
   });
+}
+
+function showPicture(picture, period, cycles) {
+  pipeline.show(picture);
+  state.drawn = state.program;
+  dimPipeline();
+  el("drawn").textContent = `${picture.program} on ${picture.machine}, ${period ? `period ${period}` : "what runs once"}: ${plural(cycles, "cycle")}, ${plural(picture.bundles.length, "bundle")}`;
 }
 
 /** Sides that the program can be compared with: other machines, the text as it was opened, and what was kept. */
@@ -886,8 +934,8 @@ async function start() {
     if (!(await current())) return;
     const names = state.program.inputs.map((port) => port.name);
     if (!names.length) throw new Error("the program has no input port");
-    const row = names.map(() => "0").join(",");
-    el("table").value = [names.join(","), ...Array(Math.min(periods(), 1000)).fill(row)].join("\n") + "\n";
+    const { run } = state, row = (_, i) => names.map((name) => run?.inputs[name]?.[i] ?? 0).join(",");
+    el("table").value = [names.join(","), ...Array.from({ length: run?.cycles.length || periods() }, row)].join("\n") + "\n";
     changed();
   }));
   el("file").addEventListener("change", async () => {
@@ -906,6 +954,8 @@ async function start() {
     if (now && !state.dirty && now.source !== editor.text) openDocument(now);
     else showDocuments();
   });
+  // Where there is room, the machine is to be seen.
+  el("machine-box").open = innerWidth >= 1100 && innerHeight >= 800;
   select("plot");
   await openAddress(true);
   document.body.dataset.ready = "";

@@ -280,12 +280,14 @@ export class Plots {
 
   /** Curves that are shown initially: some outputs, every port with its reference (`w` and `w_ref`), what a plant gives first, and inputs that are few. */
   initial() {
+    const { plants, plant, plotted } = this.program ?? {};
     const keys = [...this.facts.keys()], outputs = keys.filter((key) => key.startsWith("out "));
     const paired = keys.filter((key) => {
       const name = this.facts.get(key).name, is = (other) => keys.some((key) => this.facts.get(key).name === other);
       return isReference(name) ? is(name.slice(0, -4)) : is(`${name}_ref`);
     });
-    const { plants, plant } = this.program ?? {}, gives = plants?.find(({ name }) => name === plant?.name)?.gives ?? [];
+    if (plotted) return new Set(keys.filter((key) => plotted.includes(this.facts.get(key).name)));
+    const gives = plants?.find(({ name }) => name === plant?.name)?.gives ?? [];
     const shown = new Set([...outputs.slice(0, SHOWN), ...paired]);
     for (const key of keys.filter((key) => key.startsWith("in ") && gives.includes(this.facts.get(key).name))) if (shown.size < SHOWN) shown.add(key);
     const inputs = keys.filter((key) => key.startsWith("in "));
@@ -337,7 +339,9 @@ export class Plots {
       groups.set(group, [...(groups.get(group) ?? []), curve]);
     }
     for (const curves of groups.values()) curves.sort((a, b) => isReference(a.name) - isReference(b.name));
-    return [...groups.values()];
+    // First what follows a reference: whether it does is what one looks for.
+    const follows = (curves) => curves.some(({ name }) => isReference(name));
+    return [...groups.values()].sort((a, b) => follows(b) - follows(a));
   }
 
   draw() {

@@ -11,7 +11,7 @@ const VIEWS = { robot: { turn: 0.6, rise: 0.42, zoom: 1 }, path: { turn: 0, rise
 export class Robot {
   /** @param moved called with the displayed pose; ended called at the end of the replay */
   constructor(canvas, moved, ended) {
-    Object.assign(this, { canvas, moved, ended, poses: [], shown: 0, playing: false, scenes: [] });
+    Object.assign(this, { canvas, moved, ended, poses: [], plan: [], shown: 0, playing: false, scenes: [] });
     this.reset();
     this.listen();
     new ResizeObserver(() => this.draw()).observe(canvas);
@@ -75,8 +75,15 @@ export class Robot {
     this.draw();
   }
 
-  begin(base, sampleTime) {
-    Object.assign(this, { base, sampleTime, poses: [], shown: 0, looked: 0, box: { low: [Infinity, Infinity, Infinity], high: [-Infinity, -Infinity, -Infinity] } });
+  /** @param plan poses of the path that is ahead */
+  begin(base, sampleTime, plan = []) {
+    Object.assign(this, { base, sampleTime, plan, poses: [], shown: 0, looked: 0, box: { low: [Infinity, Infinity, Infinity], high: [-Infinity, -Infinity, -Infinity] } });
+    this.look(plan);
+  }
+
+  /** Pose that is shown. */
+  get pose() {
+    return this.poses[this.shown] ?? this.plan[0];
   }
 
   add(poses) {
@@ -111,7 +118,7 @@ export class Robot {
   }
 
   draw() {
-    const { canvas, poses } = this;
+    const { canvas } = this;
     const width = canvas.clientWidth, height = canvas.clientHeight, ratio = devicePixelRatio || 1;
     if (!width || !height) return;
     canvas.width = width * ratio;
@@ -121,8 +128,9 @@ export class Robot {
     g.lineJoin = g.lineCap = "round";
     g.clearRect(0, 0, width, height);
     this.scenes = [];
-    if (!this.base || !poses.length) return;
-    this.look();
+    if (!this.base || !this.pose) return;
+    this.look(this.poses.slice(this.looked));
+    this.looked = this.poses.length;
     // The path is wider than high and gets most of the space: beside the robot, or in a narrow panel the upper half.
     const beside = width >= 520, across = Math.round(width * PATH), down = height / 2;
     if (beside) {
@@ -155,7 +163,7 @@ export class Robot {
     const [low, high] = [[Math.min(...across), Math.min(...down)], [Math.max(...across), Math.max(...down)]];
     const fits = Math.min((wide - 2 * MARGIN) / Math.max(high[0] - low[0], 1e-3), (tall - 2 * MARGIN - 18) / Math.max(high[1] - low[1], 1e-3));
     // A zoomed view stays centred on the tool.
-    const [, ...tool] = this.poses[this.shown], near = Math.min(1, (zoom - 1) / 2), focus = flat(tool);
+    const [, ...tool] = this.pose, near = Math.min(1, (zoom - 1) / 2), focus = flat(tool);
     const centre = [0, 1].map((i) => (zoom > 1 ? ((low[i] + high[i]) / 2) * (1 - near) + focus[i] * near : (low[i] + high[i]) / 2));
     const at = (point) => flat(point).map((value, i) => (i ? top + tall / 2 + 8 : left + wide / 2) + (value - centre[i]) * fits * zoom);
     if (name === "robot") this.arms(g, at);
@@ -192,7 +200,7 @@ export class Robot {
   }
 
   arms(g, at) {
-    const [, x, y, z, tilt, rotation] = this.poses[this.shown], base = this.base.map(([x, y]) => [x, y, 0]);
+    const [, x, y, z, tilt, rotation] = this.pose, base = this.base.map(([x, y]) => [x, y, 0]);
     const line = (points, colour, weight, close) => {
       g.beginPath();
       points.forEach((point, i) => g[i ? "lineTo" : "moveTo"](...at(point)));
@@ -220,16 +228,19 @@ export class Robot {
     }
   }
 
-  /** Extends the box around the path to include the new poses. */
-  look() {
-    for (; this.looked < this.poses.length; this.looked++) {
-      const [, ...pose] = this.poses[this.looked], { low, high } = this.box;
-      for (const axis of [0, 1, 2]) [low[axis], high[axis]] = [Math.min(low[axis], pose[axis]), Math.max(high[axis], pose[axis])];
-    }
+  /** Extends the box around the path to include poses. */
+  look(poses) {
+    const { low, high } = this.box;
+    for (const [, ...pose] of poses) for (const axis of [0, 1, 2]) [low[axis], high[axis]] = [Math.min(low[axis], pose[axis]), Math.max(high[axis], pose[axis])];
   }
 
-  /** Draws the path so far: cutting moves bold, and in the error colour where the tool error exceeds the permitted one. */
+  /** Draws the path: pale what is ahead, then what is behind; cutting moves bold, and in the error colour where the tool error exceeds the permitted one. */
   path(g, at, weight) {
+    g.beginPath();
+    this.plan.forEach((pose, i) => g[i ? "lineTo" : "moveTo"](...at(pose.slice(1, 4))));
+    g.strokeStyle = style("--edge");
+    g.lineWidth = 1;
+    g.stroke();
     const strokes = [[(pose) => pose[7] !== 1, style("--dim"), 1], [(pose) => pose[7] === 1, style("--accent"), weight], [(pose) => pose[7] === 1 && Math.abs(pose[6]) > ALLOWED, style("--bad"), weight + 2]];
     for (const [drawn, colour, wide] of strokes) {
       g.beginPath();

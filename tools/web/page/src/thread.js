@@ -19,6 +19,9 @@ export const load = async (url) => WebAssembly.compile(await fetched(url));
 
 export class Stopped extends Error {}
 
+/** Reason given for stopping a worker when what it does is about another program than the page's. */
+export const REPLACED = "another program was opened";
+
 export class Thread {
   constructor(module, url) {
     this.module = module;

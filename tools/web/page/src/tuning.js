@@ -29,12 +29,13 @@ export class Tuning {
     this.back.addEventListener("click", () => this.reset());
   }
 
-  /** Shows the constants of an assembled text. Rows of the same names stay, so that a movement goes on. */
+  /** Shows the constants of an assembled text, those with `under` below that heading. Rows of the same names stay, so that a movement goes on. */
   show(constants) {
     this.box.hidden = !constants.length;
     if (constants.map(({ name }) => name).join() !== [...this.rows.keys()].join()) {
       this.rows = new Map(constants.map((constant) => [constant.name, this.row(constant)]));
-      this.list.replaceChildren(...[...this.rows.values()].map(({ element }) => element));
+      const heading = ({ constant: { under } }, i, all) => (under && under !== all[i - 1]?.constant.under ? [node("p", { textContent: under })] : []);
+      this.list.replaceChildren(...[...this.rows.values()].flatMap((row, i, all) => [...heading(row, i, all), row.element]));
     }
     for (const constant of constants) {
       const row = this.rows.get(constant.name);
