@@ -1,8 +1,8 @@
 ; Field-oriented control of a permanent-magnet synchronous motor: Clarke, Park, two PI controllers with decoupling and a voltage
 ; limit, inverse Park, and space-vector modulation by the middle of the phases.
 ;
-; An integrator follows what the bridge gives its axis beyond the decoupling: s' = s + I·(u - f - s). Within the limits, u - f - s is KP·e, so
-; that the gain of the integral is KP·I/T = wc·R; at the limits it does not wind up.
+; An integrator follows what the bridge gives its axis beyond the decoupling: s' = s + KI·(u - f - s). Within the limits, u - f - s is KP·e, so
+; that the gain of the integral is KP·KI/T = wc·R; at the limits it does not wind up.
 
 .schedule on
 
@@ -14,8 +14,8 @@
 .const  wc  = 2*pi*800                  ; rad/s, bandwidth of the current loops
 .const  KPd = wc*Ld                     ; V/A: the plant's pole is cancelled
 .const  KPq = wc*Lq
-.const  Id  = R*T/Ld                    ; of the way that an integrator goes in a period
-.const  Iq  = R*T/Lq
+.const  KId = R*T/Ld                    ; of the way that an integrator goes in a period
+.const  KIq = R*T/Lq
 .const  DMAX = 0.95/sqrt(3)             ; of the bridge's voltage, for d; the longest vector is 1/√3, and q keeps a third of it
 
 .input  ia, ib                          ; A, measured phase currents; the third is the rest
@@ -89,10 +89,10 @@ period:
         fmul    gq, uq, udc
         fadd    gd, gd, fd
         fsub    gq, gq, fq
-        fmul    gd, gd, Id
-        fmul    gq, gq, Iq
-        fmul    sd, sd, 1 - Id
-        fmul    sq, sq, 1 - Iq
+        fmul    gd, gd, KId
+        fmul    gq, gq, KIq
+        fmul    sd, sd, 1 - KId
+        fmul    sq, sq, 1 - KIq
         fadd    sd, sd, gd
         fadd    sq, sq, gq
 

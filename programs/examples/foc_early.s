@@ -12,8 +12,8 @@
 .const  wc  = 2*pi*800                  ; rad/s, bandwidth of the current loops
 .const  KPd = wc*Ld                     ; V/A: the plant's pole is cancelled
 .const  KPq = wc*Lq
-.const  Id  = R*T/Ld                    ; of the way that an integrator goes in a period
-.const  Iq  = R*T/Lq
+.const  KId = R*T/Ld                    ; of the way that an integrator goes in a period
+.const  KIq = R*T/Lq
 .const  DMAX = 0.95/sqrt(3)             ; of the bridge's voltage, for d; the longest vector is 1/√3, and q keeps a third of it
 .const  U   = 24.0                      ; V, of the bridge before the first period
 
@@ -125,10 +125,10 @@ period:
         fadd    gd, ud, fd
         fsub    gq, uq, fq
         fsub    gq, gq, we_psi
-        fmul    gd, gd, Id
-        fmul    gq, gq, Iq
-        fmul    sd, sd, 1 - Id
-        fmul    sq, sq, 1 - Iq
+        fmul    gd, gd, KId
+        fmul    gq, gq, KIq
+        fmul    sd, sd, 1 - KId
+        fmul    sq, sq, 1 - KIq
         fadd    sd, sd, gd
         fadd    sq, sq, gq
 

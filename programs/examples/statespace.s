@@ -1,5 +1,5 @@
 ; A controller in state space: 12 states, 3 measurements, 4 outputs, as linear-quadratic-Gaussian design gives it. It quiets six masses in a
-; chain of springs; statespace.csv is a record of its loop, in which a mass gets a blow and later a lasting push (statespace.py).
+; chain of springs; statespace.csv is a record of its loop, in which a mass gets a blow and later a lasting push (plant/chain.py).
 ;
 ;   x' = A·x + B·y      u = C·x + D·y
 ;

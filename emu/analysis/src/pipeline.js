@@ -4,6 +4,8 @@
 const NS = "http://www.w3.org/2000/svg";
 /** Pixels of a row at least and, where few rows leave room, at most; of the axis, the least and the largest of a column, before the first. */
 const ROW = 18, TALL = 30, AXIS = 22, NARROW = 1.5, WIDE = 48, GAP = 6;
+/** Pixels below the rows that are enough for the stalls. */
+const ROOM = 200;
 /** Rows that are drawn beyond the edges. */
 const BEYOND = 3;
 /**
@@ -374,6 +376,8 @@ export class Pipeline {
     const [least, most] = { new: [7, 20], all: [NARROW, WIDE] }[this.fits] ?? [this.width, this.width];
     this.width = Math.min(most, Math.max(least, (scroll.clientWidth - this.labelWidth - 4 * GAP) / Math.max(1, this.columns)));
     this.row = Math.floor(Math.min(TALL, Math.max(ROW, (scroll.clientHeight - AXIS - 8) / Math.max(1, this.rows.length))));
+    // Where the rows leave room, the stalls have it.
+    if (this.fits === "new" && scroll.clientHeight - AXIS - this.rows.length * this.row > ROOM) this.stalls.open = true;
     this.parent.style.setProperty("--row", `${this.row}px`);
     sizer.style.width = `${this.labelWidth + this.columns * this.width + 24}px`;
     sizer.style.height = `${AXIS + this.rows.length * this.row + 8}px`;

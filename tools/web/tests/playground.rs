@@ -144,9 +144,11 @@ fn every_example_assembles_and_runs() {
         assert_ne!(example["title"], "", "{}", example["name"]);
         let params = json!({
             "name": example["name"], "source": example["source"], "machine": "t3",
-            "inputs": example["inputs"].as_str().unwrap_or_default(),
+            "inputs": example["inputs"].as_str().unwrap_or_default(), "plant": example["plant"],
+            "periods": example["periods"],
         });
         let told = call(&mut playground, "assemble", params);
+        assert_eq!(told["plant_error"], Value::Null, "{}", example["name"]);
         assert_eq!(told["assembled"], true, "{}: {}", example["name"], told["text"]);
         assert_eq!(told["inputs_error"], Value::Null, "{}", example["name"]);
         assert!(told["bounds"].is_array(), "{}", example["name"]);
@@ -491,7 +493,7 @@ fn a_plant_closes_the_loop() {
     assert_eq!(pi["plant"]["name"], "dc_motor", "the first example closes its loop");
     let with = |plant: Value, source: &str, inputs: &Value| json!({ "name": "pi.s", "source": source, "machine": "t3", "inputs": inputs, "plant": plant, "periods": 400 });
     let source = pi["source"].as_str().expect("a text");
-    let told = call(&mut playground, "assemble", with(pi["plant"].clone(), source, &pi["inputs"]));
+    let told = call(&mut playground, "assemble", with(pi["plant"].clone(), source, &json!("")));
     assert_eq!((&told["plant"]["name"], &told["plant_error"]), (&json!("dc_motor"), &Value::Null));
     assert_eq!(told["plants"][0]["gives"], json!(["w"]));
     assert_eq!(told["rows"], 400);
@@ -518,7 +520,7 @@ fn a_plant_closes_the_loop() {
     assert_eq!(shown, Some(speeds[140] as f32), "{}", end["view"]["inputs"]);
     // Another load gives another speed; without a table, the other inputs are 0.
     let heavy = json!({ "name": "dc_motor", "parameters": { "load": 0.8 } });
-    call(&mut playground, "assemble", with(heavy.clone(), source, &pi["inputs"]));
+    call(&mut playground, "assemble", with(heavy.clone(), source, &json!("")));
     let loaded = call(&mut playground, "run", json!({ "begin": true }));
     assert!(loaded["inputs"]["w"][120].as_f64() < Some(speeds[120] - 1.0));
     let told = call(&mut playground, "assemble", with(heavy, source, &json!("w_ref,w\n100,0\n100,0\n")));

@@ -29,29 +29,21 @@ pub(crate) fn input_name(path: &Path) -> String {
     if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
 }
 
-/// Suffix for the message about a file that is not there: one of a similar name in the folder, the shipped example of the name, or where
-/// it was looked for.
+/// Suffix for the message about a file that is not there: one of a similar name in the folder, or the shipped example of the name, or an
+/// example, where there are some.
 fn near(path: &Path) -> String {
-    if path.exists() {
-        return String::new();
-    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let Some(wanted) = path.file_name() else { return String::new() };
-    let Ok(entries) = fs::read_dir(folder) else {
-        return format!(": there is no folder {}", folder.display());
-    };
-    let names: Vec<String> =
-        entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let names: Vec<String> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
     let alike = nearest(&wanted.to_string_lossy(), names.iter().map(String::as_str));
     let alike = alike.map(|name| path.with_file_name(name));
     let example = Path::new(EXAMPLES).join(wanted);
     let mut examples = [example.clone(), example.with_extension("s")].into_iter();
     match alike.or_else(|| examples.find(|example| example.exists())) {
         Some(meant) => format!("; did you mean `{}`?", meant.display()),
-        None => {
-            let here = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
-            format!(" in {}", here.display())
-        }
+        None if Path::new(EXAMPLES).is_dir() => format!("; examples are in {EXAMPLES}"),
+        None => String::new(),
     }
 }
 
@@ -60,7 +52,12 @@ pub(crate) fn open(path: &Path) -> Result<Box<dyn Read>> {
     if is_dash(path) {
         return Ok(Box::new(io::stdin().lock()));
     }
-    let file = File::open(path).with_context(|| format!("cannot open {}{}", path.display(), near(path)))?;
+    let file = match File::open(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            bail!("cannot open {}: No such file or directory{}", path.display(), near(path))
+        }
+        opened => opened.with_context(|| format!("cannot open {}", path.display()))?,
+    };
     if file.metadata().is_ok_and(|about| about.is_dir()) {
         bail!("{} is a folder, not a file", path.display());
     }

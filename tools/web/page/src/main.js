@@ -515,6 +515,9 @@ async function showAhead(wanted, isOver) {
     plots.show(run, state.program);
     showCycles();
     showView(program.view);
+    showParameters();
+    showPlants();
+    tuning.enabled = parameters.enabled = plant.enabled = false;
     const about = seconds(), later = `assembling it here${about ? `, about ${about} s` : ""} …`;
     el("cycles").append(` · ${later}`);
     el("head").append(` · ${later}`);

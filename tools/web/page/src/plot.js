@@ -9,7 +9,7 @@ const DASHES = [[], [], [7, 4], [9, 3, 2, 3]], REFERENCE = [2, 3];
 /** Maximum number of curves over one axis. */
 const TOGETHER = COLOURS.length;
 /** Number of outputs that are shown initially, and most inputs that are. */
-const SHOWN = 4, FEW = 2;
+const SHOWN = 4, FEW = 3;
 /** Time axis in ms up to this duration in s. */
 const BRIEF = 2;
 /** Height of a folded chart in pixels. */

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Designs the controller of statespace.s, and records statespace.csv in its loop: `python statespace.py`.
+"""Designs the controller of statespace.s, and records statespace.csv in its loop: `python chain.py`.
 
 Six masses in a chain, between walls, have springs of one stiffness. Forces act on the masses 1, 3, 4 and 6; the positions of 1, 3 and 5
 are measured. The controller is linear-quadratic-Gaussian, with the measurement of a period in the forces of the same period. The loop is
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parent.parent
 MASSES, MASS, STIFFNESS, DAMPING = 6, 0.1, 40.0, 0.02  # kg, N/m, N·s/m
 PERIOD = 0.01  # s
 ACTUATED, MEASURED = [0, 2, 3, 5], [0, 2, 4]
