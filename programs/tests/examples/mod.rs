@@ -38,7 +38,7 @@ const CASES: &[Case] = &[
     case("biquads", || Box::<reference::Biquads>::default(), 1e-5),
     case("kalman", || Box::<reference::Kalman>::default(), 2e-5),
     case("lu", || Box::<reference::Lu>::default(), 2e-3),
-    case("statespace", || Box::<reference::StateSpace>::default(), 5e-7),
+    case("statespace", || Box::<reference::StateSpace>::default(), 2e-6),
     case("table", || Box::<reference::Table>::default(), 2e-5),
 ];
 
