@@ -184,6 +184,8 @@ pub struct Emulator {
     pub(crate) period: Option<Period>,
     /// Report of the last period to end, until the host takes it.
     pub(crate) report: Option<PeriodReport>,
+    /// Cycles of publications that the host has not taken yet; `None` if they are not recorded.
+    pub(crate) publications: Option<Vec<Cycle>>,
     pub(crate) tally: Tally,
     pub(crate) cache: Cache,
     pub(crate) journal: Journal,
@@ -216,6 +218,7 @@ impl Clone for Emulator {
             ticks: self.ticks.clone(),
             period: self.period,
             report: self.report.clone(),
+            publications: self.publications.clone(),
             tally,
             cache: Cache::default(),
             journal: Journal::default(),
@@ -291,6 +294,7 @@ impl Emulator {
             ticks: Ticks::default(),
             period: None,
             report: None,
+            publications: None,
             tally: Tally::new(code.len()),
             cache: Cache::default(),
             journal: Journal::default(),
@@ -388,12 +392,13 @@ impl Emulator {
         self.drop_blocks();
     }
 
-    /// Records every write to these output ports, latched or not, until [`Emulator::take_port_writes`]. (This does not slow down
-    /// runs, as an observer of all events would.)
+    /// Records every write to these output ports, latched or not, until [`Emulator::take_port_writes`], and every publication until
+    /// [`Emulator::take_publications`]. (This does not slow down runs, as an observer of all events would.)
     pub fn set_watched(&mut self, ports: impl IntoIterator<Item = Register>) {
         let mut watched = RegisterSet::default();
         ports.into_iter().for_each(|port| watched.insert(port));
         Arc::make_mut(&mut self.code).watch(&watched);
+        self.publications.get_or_insert_default();
         self.drop_blocks();
     }
 
@@ -402,6 +407,11 @@ impl Emulator {
         let mut writes = std::mem::take(&mut self.state.port_writes);
         writes.sort_by_key(|write| (write.cycle, write.slot));
         writes
+    }
+
+    /// Takes the cycles since the last call in which a `publish` or a `wait` issued, ascending.
+    pub fn take_publications(&mut self) -> Vec<Cycle> {
+        self.publications.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// Drops all blocks, after adding their statistics to the tally.

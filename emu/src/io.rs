@@ -436,9 +436,16 @@ impl Emulator {
 
     /// Publishes the outputs: a `publish` has issued in `cycle`.
     pub(crate) fn publish_issued(&mut self, cycle: Cycle) {
-        self.state.publish_outputs(self.code.machine);
+        self.publish_outputs(cycle);
         if let Some(period) = &mut self.period {
             period.published.get_or_insert(cycle);
+        }
+    }
+
+    fn publish_outputs(&mut self, cycle: Cycle) {
+        self.state.publish_outputs(self.code.machine);
+        if let Some(publications) = &mut self.publications {
+            publications.push(cycle);
         }
     }
 
@@ -449,7 +456,7 @@ impl Emulator {
         }
         self.ticks.waited = Some(cycle);
         self.turns.iter_mut().for_each(|turns| turns.section = 0);
-        self.state.publish_outputs(self.code.machine);
+        self.publish_outputs(cycle);
         if let Some(Period { tick, start, published, missed, lost }) = self.period.take() {
             self.report = Some(PeriodReport {
                 tick,

@@ -29,17 +29,15 @@ pub struct Options {
     /// Directs programs to rare cases: calls as deep as the return stack, and operands whose sums tie, cancel, or are decided by bits far
     /// below their last place.
     pub directed: bool,
-    /// Publishes outputs before the end of periods, where `control` is set; a system's programs do not.
-    pub publish: bool,
 }
 
 impl Options {
     /// Programs that run without fault: `.once` part, `wait`, a period, `wait`, subroutines.
     pub const TAME: Options =
-        Options { bundles: 40, control: true, wild: false, three: false, directed: false, publish: true };
+        Options { bundles: 40, control: true, wild: false, three: false, directed: false };
     /// Programs that may do anything.
     pub const WILD: Options =
-        Options { bundles: 40, control: true, wild: true, three: false, directed: false, publish: true };
+        Options { bundles: 40, control: true, wild: true, three: false, directed: false };
 }
 
 /// Random numbers for programs and operands, from SplitMix64.
@@ -325,13 +323,12 @@ impl Generator {
     fn body(&mut self, bundles: u32) {
         let end = self.bundles.len() + bundles as usize;
         while self.bundles.len() < end {
-            let kinds = if self.options.publish { 15 } else { 14 };
-            match self.random.below(if self.options.control { kinds } else { 8 }) {
+            match self.random.below(if self.options.control { 15 } else { 8 }) {
                 0..8 => self.plain(),
                 8 | 9 => self.skip(),
                 10 => self.repeat(),
                 11 => self.call(),
-                12 if self.options.publish => self.publish(),
+                12 => self.publish(),
                 _ => self.counted(),
             }
         }
@@ -517,7 +514,7 @@ impl Generator {
                 3 => self.repeat(),
                 // Subroutines use the counters themselves.
                 4 if self.around.repeats == 0 => self.call(),
-                5 if self.options.publish => self.publish(),
+                5 => self.publish(),
                 _ => self.plain(),
             }
         }

@@ -4,8 +4,8 @@
 // Contract
 //   write, value: the sender's ports, in the cycle of writeback. shown: the set published last; published is high in the first
 //   cycle of a new one. The receiver takes the whole set in one cycle, so that it never sees a part of a new one.
-//   Published by the sender's `wait`: publish is the sender's `ended`, two cycles after the `wait` of cycle c; the set is shown from
-//   c + 3 + LENGTH on.
+//   Published with the sender's outputs: publish is the sender's `published`, two cycles after the `publish` or `wait` of cycle c; the
+//   set is shown from c + 3 + LENGTH on.
 //   STROBE: publish is the write to the strobe's port, in its writeback c; the set, values of that cycle included, is shown from
 //   c + 3 + LENGTH on.
 //   HOST: publish and all values come from the host, in one cycle h; they are shown from h + 1 + LENGTH on.

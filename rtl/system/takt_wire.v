@@ -3,8 +3,8 @@
 //
 // Contract
 //   write, value: the sender's port, in the cycle of writeback, or the host's. arrives, arrived: the same, LENGTH cycles later.
-//   LATCHED: the sender's ports are latched. Then ended, two cycles after its `wait`, sends the last value written before that cycle,
-//   if there was a write since the previous `wait`. Every writeback between a `wait` and its `ended` belongs to that period.
+//   LATCHED: the sender's ports are latched. Then publish, two cycles after its `publish` or `wait`, sends the last value written before
+//   that cycle, if there was a write since the previous one. No result that follows a `publish` or `wait` is written before its publish.
 
 module takt_wire #(
     parameter LATCHED = 0,
@@ -14,7 +14,7 @@ module takt_wire #(
     input  wire        rst,
     input  wire        write,
     input  wire [31:0] value,
-    input  wire        ended,
+    input  wire        publish,
     output wire        arrives,
     output wire [31:0] arrived
 );
@@ -25,15 +25,15 @@ module takt_wire #(
     generate
         if (LATCHED == 0) begin : g_direct
             assign {sends, sent} = {write, value};
-            wire unused = &{1'b0, rst, ended};
+            wire unused = &{1'b0, rst, publish};
         end else begin : g_latched
             reg        changed;
             reg [31:0] held;
             always @(posedge clk) begin
                 if (write) held <= value;
-                changed <= ~rst & (write | (changed & ~ended));
+                changed <= ~rst & (write | (changed & ~publish));
             end
-            assign {sends, sent} = {ended & changed, held};
+            assign {sends, sent} = {publish & changed, held};
         end
     endgenerate
 

@@ -54,7 +54,7 @@ impl Writer {
     /// Writes a core with a random program.
     fn core(&mut self, core: usize, machine: &'static Machine, path: &str) -> Program {
         let Writer { random, text, .. } = self;
-        let options = Options { bundles: 20 + random.below(30), publish: false, ..Options::TAME };
+        let options = Options { bundles: 20 + random.below(30), ..Options::TAME };
         let program = random_program(random.bits(), machine, options);
         let program = Program { latched: random.once_in(3), ..program };
         self.inputs.push(program.inputs.iter().map(|port| port.name.clone()).collect());
@@ -231,6 +231,8 @@ struct ReferenceCore {
     /// Writes to output ports whose cycle has not come.
     writes: Vec<(Cycle, Register, u32)>,
     waits: BTreeSet<Cycle>,
+    /// Cycle of the last publication.
+    published: Option<Cycle>,
     waited: Option<Cycle>,
     /// Arrivals of this cycle, by mailbox.
     arrived: Vec<(usize, u32)>,
@@ -294,6 +296,7 @@ impl Reference {
                 pins: DelayLine::new(core.input_delay()),
                 writes: Vec::new(),
                 waits: BTreeSet::new(),
+                published: None,
                 waited: None,
                 arrived: Vec::new(),
                 halted: false,
@@ -389,12 +392,14 @@ impl Reference {
                     core.emulator.tick_at(now);
                 }
             }
-            let (writes, waits) = (&mut core.writes, &mut core.waits);
+            let (writes, waits, published) = (&mut core.writes, &mut core.waits, &mut core.published);
             let mut sink = |event: &Event| match event {
                 Event::PortWrite(write) => writes.push((write.cycle, write.register, write.value)),
                 Event::Wait { cycle, .. } => {
                     waits.insert(*cycle);
+                    *published = Some(*cycle);
                 }
+                Event::Publish { cycle, .. } => *published = Some(*cycle),
                 Event::Halt { .. } => {
                     core.waited.get_or_insert(now);
                     core.halted = true;
@@ -443,10 +448,10 @@ impl Reference {
         found.map(|(_, _, value)| *value)
     }
 
-    /// The core at this end waits for its tick in this cycle.
-    fn waits(&self, end: End, now: Cycle) -> bool {
+    /// The core at this end publishes its outputs in this cycle.
+    fn publishes(&self, end: End, now: Cycle) -> bool {
         match end {
-            End::Core(core) => self.cores[core].waits.contains(&now),
+            End::Core(core) => self.cores[core].published == Some(now),
             End::Host => false,
         }
     }
@@ -468,11 +473,11 @@ impl Reference {
     fn wire(&mut self, description: &Description, number: usize, link: &Link, now: Cycle) {
         let written = self.written(link.from, link.fields[0].output, now);
         let latched = description.core(link.from).is_some_and(|core| core.program.latched);
-        let wait = self.waits(link.from, now);
+        let publishes = self.publishes(link.from, now);
         let state = &mut self.links[number];
         let sent = if latched {
             state.changed = written.or(state.changed);
-            if wait { state.changed.take() } else { None }
+            if publishes { state.changed.take() } else { None }
         } else {
             written.or(state.host_value.take())
         };
@@ -501,14 +506,14 @@ impl Reference {
         }
     }
 
-    /// Writes fields of a snapshot; publishes them with a write of the strobe, or when the sender waits.
+    /// Writes fields of a snapshot; publishes them with a write of the strobe, or when the sender publishes its outputs.
     fn publish_snapshot(&mut self, number: usize, link: &Link, strobe: Option<Register>, now: Cycle) {
         let fields = link.fields.iter().enumerate();
         let mut writes: Vec<(usize, u32)> =
             fields.filter_map(|(i, field)| Some((i, self.written(link.from, field.output, now)?))).collect();
         let publish = match strobe {
             Some(strobe) => self.written(link.from, Some(strobe), now).is_some(),
-            None => self.waits(link.from, now),
+            None => self.publishes(link.from, now),
         };
         let state = &mut self.links[number];
         let host = state.host_publish.take();

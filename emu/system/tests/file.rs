@@ -18,7 +18,6 @@ fn told(text: &str) -> String {
         };
         let source = match request.path {
             "a.s" => A.to_owned(),
-            "early.s" => A.replace(" mov k, n\n", " mov k, n\n publish\n"),
             _ => return Err(missing()),
         };
         let options = Options { machine: request.machine.unwrap_or(&takt_isa::F3), ..Options::default() };
@@ -60,7 +59,6 @@ fn mistakes() {
         ("an unknown key", changed("latency", "latencey")),
         ("a missing key", changed("program = \"a.s\"\n", "")),
         ("a missing program", changed("\"a.s\"", "\"b.s\"")),
-        ("a program that publishes before its `wait`", changed("\"a.s\"", "\"early.s\"")),
         ("an unknown machine", changed("program", "machine = \"t33\"\nprogram")),
         ("a base tick of 0", changed("tick = 1000", "tick = 0")),
         ("a negative tick", changed("tick = 1000", "tick = -1")),

@@ -74,6 +74,9 @@ fn no_command_takes_fewer_cycles_or_more() {
     let snapshot = "[[snapshot]]\nname = \"s\"\nfrom = \"a\"\nto = \"b\"\nports = [\"o -> i\"]\n";
     let wire = "[[wire]]\nfrom = \"a.o\"\nto = \"b.i\"\nlatency = 7\n";
     let latched = format!(".ports latched\n{SHOW}");
+    // Work of more than 200 cycles after the outputs are published.
+    let early = AT_END.replace("p: nop\n", "p: mov o, i\n publish\n").replace(" mov o, i\n wait", " wait");
+    let latched_early = format!(".ports latched\n{early}");
     let cases = [
         // Reads late in a period that is under way, just before the snapshot is taken.
         (AT_END, snapshot, 1, 230),
@@ -82,6 +85,9 @@ fn no_command_takes_fewer_cycles_or_more() {
         (&latched, snapshot, 1, 230),
         (&latched, wire, 2, 10),
         (SHOW, wire, 1, 0),
+        (&early, snapshot, 1, 230),
+        (&latched_early, snapshot, 1, 230),
+        (&latched_early, wire, 2, 10),
     ];
     for (first, link, every, offset) in cases {
         let description = pair(first, link, every, offset);
@@ -137,9 +143,10 @@ fn delays(random: &mut Random, periods: u32) -> String {
     let shift: String = shift.iter().rev().map(|step| step.split(" ; ").next().unwrap_or_default()).collect();
     let work = " fdiv y:float, y:float, 1.0\n".repeat(random.below(8) as usize);
     let out = format!(" mov o, {value}\n");
-    let body = match random.once_in(2) {
-        true => format!("{loads}{out}{work}{shift}"),
-        false => format!("{work}{loads}{out}{shift}"),
+    let body = match random.below(3) {
+        0 => format!("{loads}{out}{work}{shift}"),
+        1 => format!("{loads}{out} publish\n{work}{shift}"),
+        _ => format!("{work}{loads}{out}{shift}"),
     };
     format!("{head}.once\n{once} mov y, zero\n wait p\n.period\np: nop\n{body} wait p\n")
 }

@@ -578,6 +578,31 @@ fn circuit_and_emulator_have_the_same_words() {
     compare(&description, board(&description, "system-words"), 20);
 }
 
+/// Servo and watch publish their outputs and work on for more than 100 cycles; the servo's ports are latched.
+#[test]
+fn outputs_published_early_reach_the_pins() {
+    let description = system(&|name, source| {
+        let work = "        spare = spare*0.5 + 1\n".repeat(20);
+        let ports = if name == "servo.s" { ".ports latched\n" } else { "" };
+        let (head, end) = source.rsplit_once("        wait    period").expect("a period");
+        let (once, period) = head.split_once("        wait    period").expect("a first `wait`");
+        match name {
+            "profile.s" => source.to_owned(),
+            _ => format!(
+                "{ports}.state spare\n{once}        mov spare, zero\n        wait    period{period}        publish\n{work}        wait    period{end}"
+            ),
+        }
+    });
+    let watch = takt_analysis::bound(&description.cores[2].program).expect("it can be bounded");
+    let period = watch.sections.iter().find(|section| !section.once).expect("a period");
+    assert!(period.to_outputs().worst + 100 < period.cycles.best, "{period:?}");
+    let mut sim = board(&description, "system-early");
+    let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
+    drives_after_power_up(&mut sim);
+    pins_follow_as_the_bound_says(&mut connect(sim), &description, encoder);
+    compare(&description, board(&description, "system-early"), 8);
+}
+
 /// Faults in the module around the system, planted one at a time, are noticed.
 #[test]
 fn planted_faults_are_noticed() {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// takt_output_latch: holds a core's outputs from its `wait` on, so that all peripherals take them together, and counts its periods; for a
-// core whose outputs come over links.
+// takt_output_latch: holds a core's outputs from its `publish` or `wait` on, so that all peripherals take them together, and counts its
+// periods; for a core whose outputs come over links.
 //
 // Contract
-//   begins: high for a cycle when a base tick begins a period of the core; tick: when the core is given it. ended: two cycles after
-//   a `wait`. Those before the first tick end no period.
-//   At the end of a period, after DELAY cycles, `values`, 32 bits each, are kept, scaled one by one (takt_scale: FLOATS and
+//   begins: high for a cycle when a base tick begins a period of the core; tick: when the core is given it. published: two cycles after
+//   a `publish` or a `wait`; ended: after a `wait`. Those before the first tick belong to no period.
+//   After the first published of a period, and DELAY cycles, `values`, 32 bits each, are kept, scaled one by one (takt_scale: FLOATS and
 //   EXPONENTS have a bit and 10 bits for each), and put is high for a cycle once `held` has them all. nan: one was no number.
 //   idle: the core waits and nothing is under way. periods: ended since reset; cycles: of the last, from begins to put; most_cycles:
 //   the most.
@@ -22,6 +22,7 @@ module takt_output_latch #(
     input  wire        rst,       // of the cores
     input  wire        begins,
     input  wire        tick,
+    input  wire        published,
     input  wire        ended,
     input  wire        waiting,
     input  wire [32*OUTPUTS+31:0] values,
@@ -40,16 +41,19 @@ module takt_output_latch #(
     // ---- when a period begins and ends
 
     reg         begun, busy, late, ready;
+    reg         handed;       // published in this period
     reg  [2:0]  leaves;       // cycles in which the core still waits after its tick
     reg  [31:0] elapsed, since, span;
     wire        done = ended & begun;
+    wire        hands = published & begun & ~handed;
 
     always @(posedge clk) begin
         begun   <= begun | tick;
         // `since` counts the later of two periods that are under way.
         since   <= begins ? 32'd1 : since + 32'd1;
         elapsed <= begins & (~busy | (done & ~late)) ? 32'd1 : done & late ? since + 32'd1 : elapsed + 32'd1;
-        if (done) span <= elapsed;
+        handed  <= (handed | hands) & ~done;
+        if (hands) span <= elapsed;
         case ({begins, done})
             2'b10: {busy, late} <= {1'b1, busy};
             2'b01: {busy, late} <= {late, 1'b0};
@@ -59,7 +63,7 @@ module takt_output_latch #(
         else if (begun & leaves != 3'd0 & ~ready) leaves <= leaves - 3'd1;
         ready <= begins | (ready & ~tick);
         if (rst) begin
-            {begun, busy, late, ready} <= 4'd0;
+            {begun, busy, late, ready, handed} <= 5'd0;
             leaves <= 3'd0;
         end
     end
@@ -74,7 +78,7 @@ module takt_output_latch #(
     reg  [31:0] value1;
     wire [31:0] result;
 
-    // From begins to put; from `ended` to put it is always the same.
+    // From begins to put; from `hands` to put it is always the same.
     wire [31:0] ends = span + {16'd0, DELAYS} + {24'd0, LAST} + 32'd7;
 
     assign idle = waiting & state == 2'd0 & ~again & leaves == 3'd0 & ~ready;
@@ -99,11 +103,11 @@ module takt_output_latch #(
         {reads4, reads3, reads2, reads1} <= {reads3, reads2, reads1, state == 2'd2 & number != LAST};
         value1 <= held[32*number +: 32];
         if (reads4) held[32*which4 +: 32] <= result;
-        if (done & state != 2'd0) again <= 1'b1;
+        if (hands & state != 2'd0) again <= 1'b1;
         case (state)
             2'd0: begin
                 rest <= 16'd1;
-                if (done | again) begin
+                if (hands | again) begin
                     again <= 1'b0;
                     state <= 2'd1;
                 end

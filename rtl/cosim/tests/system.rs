@@ -194,7 +194,7 @@ fn with_every_link() -> Description {
     let [one, two] = machines();
     let programs: BTreeMap<String, Program> = [("a.s", one, 1), ("b.s", two, 2), ("c.s", one, 3)]
         .map(|(path, machine, seed)| {
-            let program = random_program(seed, machine, Options { publish: false, ..Options::TAME });
+            let program = random_program(seed, machine, Options::TAME);
             let program = with_inputs_at(program, &places(machine));
             (path.to_owned(), Program { latched: seed == 1, ..program })
         })
@@ -222,8 +222,8 @@ const FAULTS: &[Fault] = &[
     ("takt_delay", "ring[next]", "ring[at]"),
     // Wire: another value. From latched ports: sent without a write, sent twice.
     ("takt_wire", "{write, value}", "{write, value[30:0], 1'b0}"),
-    ("takt_wire", "ended & changed", "ended"),
-    ("takt_wire", "write | (changed & ~ended)", "write | changed"),
+    ("takt_wire", "publish & changed", "publish"),
+    ("takt_wire", "write | (changed & ~publish)", "write | changed"),
     // Snapshot: half old and half new; values still in transit; taken a cycle early, or by a core that does not wait.
     ("takt_snapshot", "HOST ? arrived : working", "(working & {FIELDS{32'hffff0000}}) | (shown & {FIELDS{32'h0000ffff}})"),
     ("takt_snapshot", "HOST ? arrived : working", "arrived"),

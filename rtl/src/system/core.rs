@@ -210,7 +210,7 @@ fn write_core(
     let (seen, unseen) =
         if is_watched { (board_outputs(own), Vec::new()) } else { (Vec::new(), board_outputs(own)) };
     open.extend(unseen);
-    open.extend([net::PUBLISHED, own.retire_address(), own.retire_flags()]);
+    open.extend([own.retire_address(), own.retire_flags()]);
     let mut pins: [(Net, Expr); 4] = [
         (net::INPUT_WRITE, LOAD_INPUT | gate_write),
         (own.input_index(), choose(net::RST, net::LOAD_ADDRESS.low(own.input_bits), gate_index)),

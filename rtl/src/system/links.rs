@@ -20,7 +20,7 @@ pub(super) fn write(plan: &SystemPlan, m: &mut Module, reset: &Net) {
                 let by = match (strobe, link.from) {
                     (Some(_), _) => "published by its strobe",
                     (None, End::Host) => "published by the host",
-                    (None, End::Core(_)) => "published by the sender's `wait`",
+                    (None, End::Core(_)) => "published with the sender's outputs",
                 };
                 m.comment(format!("docs/system.md, Snapshot: {}, {by}; {way}.", link.name));
                 snapshot(plan, m, number, link, reset);
@@ -72,10 +72,10 @@ fn pin(plan: &SystemPlan, number: usize, kind: PinKind) -> Expr {
     plan.pin(number, kind).map_or_else(no, Expr::from)
 }
 
-/// Expression that is 1 if a core's `wait` ended a period two cycles ago.
-fn ended(plan: &SystemPlan, end: End) -> Expr {
+/// Expression that is 1 if a core published its outputs two cycles ago.
+fn published(plan: &SystemPlan, end: End) -> Expr {
     match end {
-        End::Core(core) => plan.of_core(core, net::ENDED.name()).into(),
+        End::Core(core) => plan.of_core(core, net::PUBLISHED.name()).into(),
         End::Host => no(),
     }
 }
@@ -94,7 +94,7 @@ fn wire(plan: &SystemPlan, m: &mut Module, number: usize, link: &Link, reset: &N
         .parameter("LATCHED", latched.into())
         .port("write", write)
         .port("value", value)
-        .port("ended", if latched { ended(plan, link.from) } else { no() });
+        .port("publish", if latched { published(plan, link.from) } else { no() });
     outputs(plan, m, number, instance, &[("arrives", 1), ("arrived", 32)]);
     if let (End::Host, Some(shown)) = (link.to, plan.pin(number, PinKind::Field(0))) {
         m.comment("The host sees what arrives in a cycle from the next one on.");
@@ -118,7 +118,7 @@ fn snapshot(plan: &SystemPlan, m: &mut Module, number: usize, link: &Link, reset
     let publish = match (link.from, strobe) {
         (End::Host, _) => pin(plan, number, PinKind::Send),
         (from, Some(_)) => plan.write(from, strobe),
-        (from, None) => ended(plan, from),
+        (from, None) => published(plan, from),
     };
     let count = link.fields.len() as u32;
     let instance = instance(plan, "takt_snapshot", number, link, reset)

@@ -12,8 +12,9 @@ use takt_isa::timing::Cycle;
 pub(super) const DUE: Net = Net::bit("due");
 
 /// Status outputs that a core's module passes on from its core.
-pub(super) const STATUS: [Net; 8] = [
+pub(super) const STATUS: [Net; 9] = [
     net::ENDED,
+    net::PUBLISHED,
     net::WAITING,
     net::HALTED,
     net::DEADLINE_MISSED,
@@ -153,8 +154,8 @@ impl SystemPlan {
         used.into_iter().map(|(register, sent)| OutputPort { register, name: name(register), sent }).collect()
     }
 
-    /// Some link sends when the core's `wait` ends a period.
-    pub(super) fn is_waited_for(&self, core: usize) -> bool {
+    /// Some link sends when the core publishes its outputs.
+    pub(super) fn sends_published(&self, core: usize) -> bool {
         let latched = self.description.cores[core].program.latched;
         let own = self.description.links.iter().filter(|link| link.from == End::Core(core));
         own.into_iter().any(|link| match link.kind {
@@ -241,7 +242,7 @@ impl SystemPlan {
     pub fn status_pins(&self) -> Vec<Net> {
         let cores = self.cores.len() as u32;
         let told =
-            STATUS.into_iter().skip(1).map(|net| Net::named(net.name().to_owned()).wide(net.width() * cores));
+            STATUS.into_iter().skip(2).map(|net| Net::named(net.name().to_owned()).wide(net.width() * cores));
         [DUE].into_iter().chain(told).collect()
     }
 

@@ -64,19 +64,25 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
     m.finish()
 }
 
-/// The top uses this output of a core. `ended` serves only some links.
+/// The top uses this output of a core. `ended` serves a board, `published` also some links.
 fn uses_output(plan: &SystemPlan, core: usize, status: &Net) -> bool {
-    *status != net::ENDED || plan.driver == Driver::Board || plan.is_waited_for(core)
+    let for_links = *status != net::ENDED && (*status != net::PUBLISHED || plan.sends_published(core));
+    for_links || plan.driver == Driver::Board
 }
 
 /// Status outputs of the cores, each with the pin of the top that concatenates it over all cores, core 0 lowest.
 fn status_outputs(plan: &SystemPlan) -> Vec<(Net, Net)> {
-    let ended = match plan.driver {
-        Driver::Itself => None,
-        Driver::Board => Some(Net::named(net::ENDED.name().to_owned()).wide(plan.cores.len() as u32)),
+    let for_board = [net::ENDED, net::PUBLISHED];
+    let (pins, shown) = match plan.driver {
+        Driver::Itself => (Vec::new(), for_board.len()),
+        Driver::Board => {
+            let wide =
+                for_board.map(|status| Net::named(status.name().to_owned()).wide(plan.cores.len() as u32));
+            (wide.to_vec(), 0)
+        }
     };
-    let pins = ended.into_iter().chain(plan.status_pins().into_iter().skip(1));
-    STATUS.into_iter().skip(usize::from(plan.driver == Driver::Itself)).zip(pins).collect()
+    let pins = pins.into_iter().chain(plan.status_pins().into_iter().skip(1));
+    STATUS.into_iter().skip(shown).zip(pins).collect()
 }
 
 /// Net of a core's status output.

@@ -13,7 +13,7 @@ use takt_diagnostics::source::{Sources, Span};
 use takt_diagnostics::{nearest, toml_mistake};
 use takt_isa::program::Port;
 use takt_isa::system::{Core, Description, End, Field, Link, MAX_CORES, MAX_LATENCY, MAX_TICK, MIN_LATENCY};
-use takt_isa::{BundleAddress, Flow, Machine, Program, Type};
+use takt_isa::{Machine, Program, Type};
 use toml::Spanned;
 
 /// Minimum cycles between the ticks of a core, in addition to the cycles in which its snapshots enter.
@@ -131,15 +131,6 @@ fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
         return diagnostic.help("say how many cycles there are from base tick to base tick: `tick = 12500`");
     }
     diagnostic
-}
-
-/// The first bundle of a program that publishes the outputs.
-fn publication(program: &Program) -> Option<BundleAddress> {
-    let publishes = |address: &BundleAddress| {
-        let bundle = program.bundle(*address).and_then(Result::ok);
-        bundle.is_some_and(|bundle| Flow::of(&bundle) == Flow::Publish)
-    };
-    program.addresses().find(publishes)
 }
 
 struct Mistakes {
@@ -340,15 +331,6 @@ impl<'m> Checker<'m> {
         let (Some(program), Some(every), Some(offset), true) = (program, every, offset, good) else {
             return Ok(None);
         };
-        if let Some(address) = publication(&program) {
-            let text = format!(
-                "core `{name}` publishes its outputs before its `wait`, in {}: links carry what a `wait` publishes",
-                program.bundle_text(address)
-            );
-            self.mistakes.add("publish", table.program.span(), text).help =
-                Some("leave `publish` out of programs that run in a system".to_owned());
-            return Ok(None);
-        }
         let (path, program) = (table.program.get_ref().clone(), Arc::new(program));
         Ok(Some(Core { name: name.clone(), path, program, every, offset }))
     }

@@ -133,7 +133,7 @@ fn sent(description: &Description, link: &Link) -> OutputEvent {
         LinkKind::Snapshot { strobe: Some(by) } | LinkKind::Fifo { push: Some(by), .. } => {
             OutputEvent::By(by)
         }
-        _ if at_wait(description, link) => OutputEvent::AtWait,
+        _ if is_published(description, link) => OutputEvent::AtWait,
         _ => OutputEvent::Written,
     }
 }
@@ -148,8 +148,8 @@ fn arriving(link: &Link) -> Vec<Vec<Register>> {
     fields.map(|field| [field].into_iter().chain(status.iter().copied()).collect()).collect()
 }
 
-/// The link carries values that its sender's `wait` publishes.
-pub(super) fn at_wait(description: &Description, link: &Link) -> bool {
+/// The link carries values that its sender publishes, by a `publish` or by a `wait`.
+pub(super) fn is_published(description: &Description, link: &Link) -> bool {
     match link.kind {
         LinkKind::Snapshot { strobe } => strobe.is_none(),
         LinkKind::Wire => description.core(link.from).is_some_and(|core| core.program.latched),

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Passages of a value through the cores on its path, from the bounds of their periods and the rules of `docs/system.md`.
 
-use super::dependences::{LinkDependences, States, at_wait};
+use super::dependences::{LinkDependences, States, is_published};
 use super::limits::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
 use std::collections::{BTreeMap, BTreeSet};
-use takt_analysis::Bounds;
+use takt_analysis::{Bounds, Publication, SectionBounds};
 use takt_isa::system::{Description, End, Link, LinkKind, MIN_LATENCY};
-use takt_isa::timing::{Cycle, ENDED_DELAY};
+use takt_isa::timing::{Cycle, ENDED_DELAY, Span as Cycles};
 use takt_isa::{BundleAddress, Machine, Program};
 
 /// Bounds of a core's periods.
@@ -16,6 +16,10 @@ struct Span {
     best: i64,
     /// Most cycles from a tick to the `wait`, if no tick is missed.
     worst: i64,
+    /// Least and most cycles from a tick to the publication of the outputs, by a `publish` or by the `wait`.
+    published: (i64, i64),
+    /// Some path publishes before its `wait`.
+    publishes: bool,
     /// Cycles from the `wait` until the operations that issue together with it have written outputs; 0 without such writes.
     late: i64,
     /// Most cycles of a period whose tick comes right after the last `wait`, and the limit that they must stay below.
@@ -33,9 +37,9 @@ pub struct Pass {
     pub under_way: bool,
     /// Tick of the period that writes the results: the period of `reads`, or as many later as states take.
     pub writes: i64,
-    /// Cycle in which that period's `wait` issues.
-    pub waits: i64,
-    /// Cycle in which the results go onto the next link: at their writeback, or at the `wait` that publishes them.
+    /// Cycle in which that period publishes its outputs, by a `publish` or by its `wait`.
+    pub publishes: i64,
+    /// Cycle in which the results go onto the next link: at their writeback, or when they are published.
     pub leaves: i64,
 }
 
@@ -107,6 +111,13 @@ impl<'a> Passages<'a> {
             let periods = || bounds.sections.iter().filter(|section| !section.once);
             // If every tick comes after the front end has refilled, no period includes a refill.
             let refilled = in_time.saturating_add(core.program.machine.refill.into()) <= period;
+            let to_outputs = |section: &SectionBounds| match (section.published, refilled) {
+                (Some(Publication { cycles, .. }), true) => cycles,
+                (Some(Publication { in_time, .. }), false) => in_time,
+                (None, true) => section.cycles,
+                (None, false) => section.in_time,
+            };
+            let outputs = periods().map(to_outputs).reduce(Cycles::or).unwrap_or(Cycles::ZERO);
             let worst = periods().map(|section| section.cycles.worst).max().filter(|_| refilled);
             let ends = periods().flat_map(|section| &section.ends);
             let below = period.saturating_sub(spare);
@@ -115,6 +126,8 @@ impl<'a> Passages<'a> {
             Some(Span {
                 best: kept(periods().map(|section| section.cycles.best).min().unwrap_or(0)),
                 worst: kept(worst.unwrap_or(in_time)),
+                published: (kept(outputs.best), kept(outputs.worst)),
+                publishes: periods().any(|section| section.published.is_some()),
                 late: ends.map(|&end| late(&core.program, end)).max().unwrap_or(0).into(),
                 in_time: (in_time, below),
             })
@@ -145,6 +158,17 @@ impl<'a> Passages<'a> {
     /// Least and most cycles from a tick of a core to its `wait`, if it misses none; `None` if it never waits for a tick.
     pub fn span(&self, core: usize) -> Option<(i64, i64)> {
         self.spans[core].map(|span| (span.best, span.worst))
+    }
+
+    /// Least and most cycles from a tick of a core to the publication of its outputs, by a `publish` or by the `wait`; `None` as for
+    /// [`Passages::span`].
+    pub fn published(&self, core: usize) -> Option<(i64, i64)> {
+        self.spans[core].map(|span| span.published)
+    }
+
+    /// Some path through the core's periods publishes the outputs before its `wait`.
+    pub fn publishes(&self, core: usize) -> bool {
+        self.spans[core].is_some_and(|span| span.publishes)
     }
 
     /// Paths that begin at a link in `from`, end at a link in `to`, and carry an input of the host to an output that depends on it. No
@@ -252,10 +276,11 @@ impl<'a> Passages<'a> {
             let (reads, tick) = if under_way { (cycle, tick) } else { (grid.from(cycle), grid.from(cycle)) };
             let later = periods * grid.period;
             let (writes, tick) = (reads.max(tick + later), tick + later);
-            let waits = writes.max(tick + span.best);
-            // Writes before the `wait` are published with it.
-            let leaves = if at_wait(self.description, next) { waits.max(writes + 1) } else { writes + 1 };
-            Pass { core, reads, under_way, writes, waits, leaves }
+            let publishes = writes.max(tick + span.published.0);
+            // Writes before the publication go out with it.
+            let leaves =
+                if is_published(self.description, next) { publishes.max(writes + 1) } else { writes + 1 };
+            Pass { core, reads, under_way, writes, publishes, leaves }
         })
     }
 
@@ -267,10 +292,13 @@ impl<'a> Passages<'a> {
             let grid = self.grid(core);
             let reads = grid.from(cycle);
             let writes = reads + periods * grid.period;
-            let waits = writes + span.worst;
-            // An operation that issues with the `wait` is published by the next `wait`, a period later.
-            let leaves = waits + if at_wait(self.description, next) { 0 } else { span.late };
-            Pass { core, reads, under_way: false, writes, waits, leaves }
+            let publishes = writes + span.published.1;
+            // An operation that issues with the `wait` is published a period later.
+            let leaves = match is_published(self.description, next) {
+                true => publishes,
+                false => writes + span.worst + span.late,
+            };
+            Pass { core, reads, under_way: false, writes, publishes, leaves }
         })
     }
 
@@ -305,14 +333,14 @@ fn late(program: &Program, address: BundleAddress) -> u32 {
     bundle.iter().zip(machine.slots).filter_map(latency).max().unwrap_or(0)
 }
 
-/// Cycles from a core's write (or `wait`) until the receiver's bundles can read the value, a tick can take it, or the host sees it.
+/// Cycles from a core's write (or publication) until the receiver's bundles can read the value, a tick can take it, or the host sees it.
 pub(super) fn carry(description: &Description, link: &Link) -> i64 {
     let (transit, ended) = (link.transit() as i64, ENDED_DELAY as i64);
     let host = link.from == End::Host;
     // Delay from the arrival at the gate to the receiver's bundles; 1 at the host.
     let goes_in = 1 + description.core(link.to).map_or(0, |core| core.input_delay() as i64);
     match (&link.kind, link.to) {
-        (LinkKind::Wire, _) => transit + goes_in + if at_wait(description, link) { ended } else { 0 },
+        (LinkKind::Wire, _) => transit + goes_in + if is_published(description, link) { ended } else { 0 },
         (LinkKind::Fifo { .. }, End::Core(_)) => transit + 1 + goes_in,
         (LinkKind::Fifo { .. }, End::Host) => transit + 1,
         (LinkKind::Snapshot { .. }, to) => {

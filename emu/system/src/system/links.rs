@@ -6,7 +6,7 @@ use crate::fifo::Change;
 use std::sync::Arc;
 use takt_emu::{PortWrite, Status};
 use takt_isa::Register;
-use takt_isa::system::{End, Field, Link, LinkKind, Side, Source, Status as FifoStatus};
+use takt_isa::system::{End, Link, LinkKind, Side, Source, Status as FifoStatus};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 
 impl System {
@@ -152,9 +152,9 @@ impl System {
         }
     }
 
-    /// Puts a core's writes onto the links, and the values that its `wait` in cycle `waited` publishes.
-    pub(super) fn send(&mut self, core: usize, writes: &[PortWrite], waited: Option<Cycle>) {
-        if writes.is_empty() && waited.is_none() {
+    /// Puts a core's writes onto the links, and what it publishes in these cycles, both ascending.
+    pub(super) fn send(&mut self, core: usize, writes: &[PortWrite], publications: &[Cycle]) {
+        if writes.is_empty() && publications.is_empty() {
             return;
         }
         // The core's own writes may change the FIFOs that it sees.
@@ -164,13 +164,14 @@ impl System {
         for (number, link) in description.links.iter().enumerate() {
             if link.from == here {
                 match &link.kind {
-                    LinkKind::Wire => self.send_wire(number, link, writes, waited),
+                    LinkKind::Wire => self.send_wire(number, link, writes, publications),
                     LinkKind::Snapshot { strobe } => {
-                        self.send_snapshot(number, link, *strobe, writes, waited)
+                        let strobed = strobe.map(|strobe| cycles_of(writes, strobe));
+                        self.send_snapshot(number, link, writes, strobed.as_deref().unwrap_or(publications));
                     }
                     LinkKind::Fifo { push: Some(push), .. } => {
                         let LinkState::Fifo { working, fifo } = &mut self.links[number] else { continue };
-                        follow(link, *push, writes, working, |cycle, entry| {
+                        follow(link, writes, &cycles_of(writes, *push), working, |cycle, entry| {
                             fifo.push(cycle + link.transit(), entry);
                         });
                     }
@@ -186,71 +187,57 @@ impl System {
         }
     }
 
-    pub(super) fn send_wire(
-        &mut self,
-        number: usize,
-        link: &Link,
-        writes: &[PortWrite],
-        waited: Option<Cycle>,
-    ) {
+    fn send_wire(&mut self, number: usize, link: &Link, writes: &[PortWrite], publications: &[Cycle]) {
         let output = link.fields.first().and_then(|field| field.output);
-        let mut written = writes.iter().filter(|write| Some(write.register) == output);
+        let mut written = writes.iter().filter(|write| Some(write.register) == output).peekable();
         if !latched(&self.description, link.from) {
             for write in written {
                 self.deliver(number, write.cycle + link.transit(), 0, write.value);
             }
             return;
         }
-        let LinkState::Wire { changed, .. } = &mut self.links[number] else { return };
-        *changed = written.next_back().map(|write| write.value).or(*changed);
-        if let Some(cycle) = waited
-            && let Some(value) = changed.take()
-        {
-            self.deliver(number, cycle + ENDED_DELAY + link.transit(), 0, value);
+        for &cycle in publications {
+            let LinkState::Wire { changed, .. } = &mut self.links[number] else { return };
+            while let Some(write) = written.next_if(|write| write.cycle <= cycle) {
+                *changed = Some(write.value);
+            }
+            if let Some(value) = changed.take() {
+                self.deliver(number, cycle + ENDED_DELAY + link.transit(), 0, value);
+            }
+        }
+        if let (Some(write), LinkState::Wire { changed, .. }) = (written.last(), &mut self.links[number]) {
+            *changed = Some(write.value);
         }
     }
 
-    pub(super) fn send_snapshot(
-        &mut self,
-        number: usize,
-        link: &Link,
-        strobe: Option<Register>,
-        writes: &[PortWrite],
-        waited: Option<Cycle>,
-    ) {
-        let mut sent = Vec::new();
+    fn send_snapshot(&mut self, number: usize, link: &Link, writes: &[PortWrite], actions: &[Cycle]) {
         let LinkState::Snapshot { working, published, .. } = &mut self.links[number] else { return };
         let first = |cycle| cycle + ENDED_DELAY + link.transit() + 1;
-        match (strobe, waited, link.from) {
-            (Some(strobe), ..) => follow(link, strobe, writes, working, |cycle, values| {
-                published.push_back((first(cycle), values));
-                sent.push(first(cycle));
-            }),
-            (None, Some(cycle), End::Core(core)) => {
-                let emulator = &self.cores[core].emulator;
-                let value = |field: &Field| field.output.and_then(|port| emulator.register(port));
-                let values = link.fields.iter().map(|field| value(field).unwrap_or(0)).collect();
-                published.push_back((first(cycle), values));
-                sent.push(first(cycle));
-            }
-            _ => {}
-        }
-        for cycle in sent {
-            self.event(cycle, number, LinkEventKind::Published);
+        follow(link, writes, actions, working, |cycle, values| published.push_back((first(cycle), values)));
+        for &cycle in actions {
+            self.event(first(cycle), number, LinkEventKind::Published);
         }
     }
 }
 
-/// Applies a core's writes to the fields of a link, and calls `tell` with all fields whenever `action` is written. Fields written in the
-/// same cycle as the action are included.
+/// Cycles in which a port is written, each once.
+fn cycles_of(writes: &[PortWrite], register: Register) -> Vec<Cycle> {
+    let written = writes.iter().filter(|write| write.register == register);
+    let mut cycles: Vec<Cycle> = written.map(|write| write.cycle).collect();
+    cycles.dedup();
+    cycles
+}
+
+/// Applies a core's writes to the fields of a link, and calls `tell` with all fields in the cycle of each action. Fields written in that
+/// cycle are included. Writes and actions ascend.
 fn follow(
     link: &Link,
-    action: Register,
     writes: &[PortWrite],
+    actions: &[Cycle],
     working: &mut [u32],
     mut tell: impl FnMut(Cycle, Vec<u32>),
 ) {
-    for writes in writes.chunk_by(|a, b| a.cycle == b.cycle) {
+    let apply = |working: &mut [u32], writes: &[PortWrite]| {
         for write in writes {
             for (field, value) in link.fields.iter().zip(&mut *working) {
                 if field.output == Some(write.register) {
@@ -258,8 +245,13 @@ fn follow(
                 }
             }
         }
-        if let Some(write) = writes.iter().find(|write| write.register == action) {
-            tell(write.cycle, working.to_vec());
-        }
+    };
+    let mut left = writes;
+    for &cycle in actions {
+        let (before, after) = left.split_at(left.partition_point(|write| write.cycle <= cycle));
+        apply(working, before);
+        left = after;
+        tell(cycle, working.to_vec());
     }
+    apply(working, left);
 }

@@ -182,7 +182,7 @@ struct CoreState {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum LinkState {
     Wire {
-        /// Value that the sender's `wait` publishes, if its ports are latched.
+        /// Value that the sender's next `publish` or `wait` sends, if its ports are latched.
         changed: Option<u32>,
         /// Values on the way to the host, with the cycle in which they arrive.
         host: VecDeque<(Cycle, u32)>,
@@ -190,7 +190,7 @@ enum LinkState {
         shown: u32,
     },
     Snapshot {
-        /// Latest writes of the fields, for a link with a strobe or from the host.
+        /// Latest writes of the fields.
         working: Vec<u32>,
         /// Published values, with the first cycle in which they can be taken.
         published: VecDeque<(Cycle, Vec<u32>)>,
@@ -463,9 +463,7 @@ fn watched(description: &Description, core: usize) -> BTreeSet<Register> {
         let fields = link.fields.iter().filter_map(|field| field.output);
         match &link.kind {
             LinkKind::Wire if link.from == here => ports.extend(fields),
-            LinkKind::Snapshot { strobe: Some(strobe) } if link.from == here => {
-                ports.extend(fields.chain([*strobe]));
-            }
+            LinkKind::Snapshot { strobe } if link.from == here => ports.extend(fields.chain(*strobe)),
             LinkKind::Fifo { push, pop, .. } => {
                 if link.from == here {
                     ports.extend(fields.chain(*push));

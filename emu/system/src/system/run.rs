@@ -211,6 +211,7 @@ impl System {
             }
         };
         let writes = state.emulator.take_port_writes();
+        let publications = state.emulator.take_publications();
         if let Some(report) = state.emulator.take_period() {
             let periods = &mut state.periods;
             periods.shortest =
@@ -231,7 +232,7 @@ impl System {
             state.taken = false;
             state.tick += self.description.cores[core].period(self.description.tick);
         }
-        self.send(core, &writes, waited);
+        self.send(core, &writes, &publications);
         stop.map(|_| true)
     }
 }

@@ -3,7 +3,7 @@
 //! this file adds the board's parts before and after (docs/board.md).
 
 use super::peripherals::{inputs, outputs, peripherals_without_path};
-use super::pin_path::{End, Part, PinPath, PinPaths, states_text};
+use super::pin_path::{End, Part, PinPath, PinPaths, publisher, states_text};
 use crate::application::Application;
 use crate::kind::Direction;
 use crate::sinks::{Sink, sinks, transit};
@@ -15,7 +15,7 @@ use takt_system::latency::{LatencyError, Pass, Passages, Route};
 
 /// Cycles from the board's tick, at which peripherals capture their registers, to the write of the captured values to links.
 const DUE: i64 = 1;
-/// Cycles of `takt_output_latch` from `ended`, two cycles after a `wait`, to `put`, with no output and no register on a link.
+/// Cycles of `takt_output_latch` from `published`, two cycles after a `publish` or a `wait`, to `put`, with no output and no register on a link.
 const TURN: i64 = 8;
 /// Part of `TURN` from the cycle in which `takt_output_latch` takes the links' values to `put`, with no output.
 const PUT: i64 = 7;
@@ -159,8 +159,8 @@ fn between(
         let due = phase * tick - lead;
         let [fastest, slowest] = [passages.fastest(route, due), passages.slowest(route, due)];
         for (passes, is_fastest) in [(&fastest, true), (&slowest, false)] {
-            let waits = |pass: &Pass| if is_fastest && puts.early { pass.writes } else { pass.waits };
-            let reached = passes.iter().map(|pass| pass.reads).chain(passes.last().map(waits));
+            let publishes = |pass: &Pass| if is_fastest && puts.early { pass.writes } else { pass.publishes };
+            let reached = passes.iter().map(|pass| pass.reads).chain(passes.last().map(publishes));
             let mut before = due - DUE;
             for (stage, cycle) in stages.iter_mut().zip(reached) {
                 stage.with(cycle - before);
@@ -184,7 +184,8 @@ fn between(
             states_text(route.least[place], states).map_or_else(String::new, |states| format!(" {states}"));
         from = format!("{name}, from {}{states}", if *under_way { "there" } else { "tick" });
     }
-    parts.push(stages[cores.len()].part(format!("{from} to `wait`")));
+    let publisher = publisher(passages.publishes(last));
+    parts.push(stages[cores.len()].part(format!("{from} to {publisher}")));
     let mut after = vec![puts.cycles.part(format!("output ports to registers ({})", sinks.0.len()))];
     if puts.late > 0 {
         after.insert(0, Range(0, puts.late).part("if written with `wait`: to the next"));
@@ -194,7 +195,7 @@ fn between(
     (parts, total)
 }
 
-/// Cycles from a core's `wait` to the update of the peripherals with its outputs.
+/// Cycles from the publication of a core's outputs to the update of the peripherals with them.
 struct OutputCycles {
     cycles: Range,
     /// Additional cycles if the `wait`'s own bundle writes outputs: these are taken at the next `wait`.
@@ -211,12 +212,12 @@ fn puts(
 ) -> OutputCycles {
     let description = passages.description();
     let period = description.cores[core].period(description.tick) as i64;
-    let (best, worst) = passages.span(core).unwrap_or((0, 0));
+    let (best, worst) = passages.published(core).unwrap_or((0, 0));
     let (registers, ended) = (sinks.len() as i64, ENDED_DELAY as i64);
     let most = most as i64;
     let own = way.last().map_or(0, |link| description.links[*link].transit() as i64);
     let turn = most + registers + TURN;
-    // A `wait` that comes before the last turn has finished gets its turn afterwards.
+    // Outputs that are published before the last turn has finished get their turn afterwards.
     let again = (turn - (period - (worst - best))).clamp(0, turn - 1);
     // The latch samples values when the slowest link's have arrived.
     let early = worst + most - own + again >= period;

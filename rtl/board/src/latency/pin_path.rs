@@ -169,6 +169,11 @@ pub struct PinPaths {
     pub late: Vec<String>,
 }
 
+/// Operation that publishes the outputs of a program: a `publish`, if one comes before the `wait` on some path.
+pub(super) fn publisher(is_early: bool) -> &'static str {
+    if is_early { "`publish`" } else { "`wait`" }
+}
+
 /// Number of periods that states take, as text; `None` for no period.
 pub(super) fn states_text(least: u32, most: u32) -> Option<String> {
     match (least, most) {

@@ -2,7 +2,7 @@
 //! Paths through a core without links.
 
 use super::peripherals::{inputs, outputs, peripherals_without_path};
-use super::pin_path::{End, Part, PinPath, PinPaths, states_text};
+use super::pin_path::{End, Part, PinPath, PinPaths, publisher, states_text};
 use crate::wiring::Wiring;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::dependence::{Dependence, OutputEvent};
@@ -61,11 +61,6 @@ impl ProgramCycles {
     pub(crate) fn to_idle(self, reads: u64, writes: u64) -> Span {
         let (put, waits) = (self.to_put(reads, writes), self.period.after(reads + BEGIN + WAITS));
         Span { best: put.best.max(waits.best), worst: put.worst.max(waits.worst) }
-    }
-
-    /// Name of the operation that publishes the outputs.
-    fn publisher(self) -> &'static str {
-        if self.published.is_some() { "`publish`" } else { "`wait`" }
     }
 }
 
@@ -133,7 +128,11 @@ pub fn undivided(wiring: &Wiring, cycles: impl Into<ProgramCycles>) -> Vec<PinPa
     let (reads, writes) = (reads(wiring), writes(wiring));
     let after = [
         Part::new(format!("registers to input ports ({reads})"), reads + BEGIN, reads + BEGIN),
-        Part::new(format!("the program, from tick to {}", cycles.publisher()), span.best, span.worst),
+        Part::new(
+            format!("the program, from tick to {}", publisher(cycles.published.is_some())),
+            span.best,
+            span.worst,
+        ),
         Part::new(format!("output ports to registers ({writes})"), writes + END, writes + END),
     ];
     let busy = Part::sum("", &after);

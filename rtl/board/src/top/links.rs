@@ -120,8 +120,8 @@ impl Section<'_> {
     );
     wire [{}:0] held{k};
     takt_output_latch #(.OUTPUTS({n}), .DELAY({}), .FLOATS({}), .EXPONENTS({}), .FTOI({to_integer})) latch{k} (
-        .clk(clk), .rst(core_rst), .begins(divided[{k}]), .tick(core_ticks[{k}]), .ended(ended[{k}]), .waiting(waiting[{k}]),
-        .values({}), .held(held{k}), .put(puts[{k}]), .nan(nans[{k}]), .idle(idle[{k}]),
+        .clk(clk), .rst(core_rst), .begins(divided[{k}]), .tick(core_ticks[{k}]), .published(published[{k}]),
+        .ended(ended[{k}]), .waiting(waiting[{k}]), .values({}), .held(held{k}), .put(puts[{k}]), .nan(nans[{k}]), .idle(idle[{k}]),
         .periods(periods{k}), .cycles(cycles{k}), .most_cycles(most_cycles{k})
     );
 ",
