@@ -7,7 +7,6 @@
 .schedule on
 
 .const  T    = 50e-6                    ; s, a period of the carrier
-.const  AMP  = 20.0/2048                ; A for a step of the converters, whose middle is 2048
 .const  TURN = 4096                     ; counts in an electrical turn: 16384 in one of the shaft, four pole pairs
 .const  RAD  = 2*pi/TURN
 .const  UDC  = 24.0                     ; V, of the bridge
@@ -17,7 +16,15 @@
 .const  KI   = 2*pi*500*R*T
 .const  FULL = 3000.0/2048              ; a period of the carrier in steps of the duties' scale
 
-.input  ca:int, cb:int                  ; steps of the converters; the third current is the rest
+.if !macro.amperes                      ; isolated.s brings its own
+.macro  amperes i:float, steps:int      ; A from steps of a converter for 20 A, whose middle is 2048
+        i = itof(steps - 2048)*(20.0/2048)
+.endm
+.const  LEAST = 0
+.const  GREATEST = 4095
+.endif
+
+.input  ca:int, cb:int                  ; of the currents' converters; the third current is the rest
 .input  n:int                           ; counts of the encoder, at the time of the currents
 .input  tripped:int                     ; the register `state` of a trip
 .input  id_ref, iq_ref                  ; A, from the host
@@ -45,8 +52,8 @@ period:
         theta = itof(at)*RAD
         sn = sin(theta)
         cs = cos(theta)
-        ia = itof(ca - 2048)*AMP
-        ib = itof(cb - 2048)*AMP
+        amperes ia, ca
+        amperes ib, cb
         ibe = (ia + 2*ib)*(1/sqrt(3))
         d = ia*cs + ibe*sn
         q = ibe*cs - ia*sn
@@ -76,9 +83,9 @@ period:
         dc = (vc - mid)*(FULL/UDC) + 0.5*FULL
         wait    period
 
-; For `takt accuracy`: converters of 12 bits; counts of any number of turns; as much current as the converters measure; integrators
+; For `takt accuracy`: what the converters give; counts of any number of turns; as much current as the converters measure; integrators
 ; within their limit.
-.range  ca, cb = 0, 4095
+.range  ca, cb = LEAST, GREATEST
 .range  n = -0x80000000, 0x7fffffff
 .range  tripped = 0, 1
 .range  id_ref, iq_ref = -20, 20

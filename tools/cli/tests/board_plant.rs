@@ -99,6 +99,35 @@ fn a_motor_at_pins_moves_as_without_them() {
     assert!(trip.column("bridge.low_b")[at + 2..].iter().all(|part| *part == 1.0));
 }
 
+/// Currents by delta-sigma modulators: a step of the current; a cable that breaks trips by the filter's own limit.
+#[test]
+fn isolated_currents_close_the_loop_and_trip() {
+    let folder = Folder::new();
+    for name in ["drive.s", "isolated.s", "isolated.toml"] {
+        folder.write(name, text(name));
+    }
+    folder.write("motor.toml", text("plant/isolated.toml"));
+    let line =
+        "--wiring isolated.toml --program isolated.s --plant motor.toml --periods 200 --outputs pins.csv";
+    let done = sim(&folder, line);
+    assert!(done.status == Some(0) && done.stderr.contains("the trip `current_a` is held"), "{done:?}");
+    let pins = Table::of(&folder, "pins.csv");
+    let (current, state) = (pins.column("pmsm_switched.iq"), pins.column("tripped"));
+    assert!((current[118] - 5.0).abs() < 0.1 && (current[158] + 5.0).abs() < 0.6, "{current:?}");
+    // Bits of 0 from 8 ms on are soon beyond the limit: the program sees the trip in the next period, and the windings brake.
+    let at = state.iter().position(|state| *state != 0.0).expect("a trip");
+    assert!((160..164).contains(&at), "{at}");
+    assert!(pins.column("bridge.low_b")[at + 1..].iter().all(|part| *part == 1.0));
+    // The filter measures the phase's current in the middle of the valley, 7.6 µs before the tick.
+    let (along, angle) = (pins.column("pmsm_switched.id"), pins.column("pmsm_switched.angle"));
+    let measured = pins.column("ca");
+    for row in 0..160 {
+        let (sin, cos) = (4.0 * angle[row]).sin_cos();
+        let (phase, filtered) = (along[row] * cos - current[row] * sin, measured[row] * 20.0 / 125_000.0);
+        assert!((phase - filtered).abs() < 0.3, "period {row}: {filtered} A of {phase} A");
+    }
+}
+
 /// Six axes on one core at their pins: each moves as its goal says; a cable that is pulled stops its own axis; a comparator stops all without a clock.
 #[test]
 fn six_axes_at_pins_move_and_stop_alone() {
