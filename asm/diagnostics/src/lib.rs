@@ -4,6 +4,7 @@
 //! Every reader of a text from outside reports through this crate: the assembler, the description of a system, the robot's
 //! language, board files.
 
+mod describe;
 pub mod diag;
 pub mod levels;
 pub mod limits;
@@ -12,6 +13,7 @@ mod nearest;
 pub mod source;
 mod toml_mistake;
 
+pub use describe::describe;
 pub use diag::{Diagnostic, Diagnostics, Severity, Sink};
 pub use levels::Levels;
 pub use machine::machine;

@@ -187,7 +187,7 @@ fn end(result: Result<()>, color: bool) -> ExitCode {
         Some(Failure::Denied(messages)) => messages.iter().for_each(|text| output::error(text, color)),
         Some(Failure::Usage(_)) | None => match machine_mistake::of(&error) {
             Some(mistake) => output::message(&mistake.render(color)),
-            None => output::error(&output::describe(&error), color),
+            None => output::error(&takt_diagnostics::describe(error.as_ref()), color),
         },
     }
     ExitCode::from(match failure {

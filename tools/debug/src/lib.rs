@@ -7,6 +7,7 @@ pub mod fault;
 mod info;
 pub mod inputs;
 pub mod panes;
+pub mod parameters;
 pub mod remote;
 mod samples;
 pub mod session;

@@ -4,7 +4,7 @@
 use crate::commands::debug::{self, Debug, OpenedSession};
 use crate::commands::track;
 use crate::terminal::files::Out;
-use crate::terminal::output::{describe, message};
+use crate::terminal::output::message;
 use anyhow::{Context, Result};
 use clap::{Args, Parser};
 use crossbeam_channel::unbounded;
@@ -14,6 +14,7 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use takt_debug::session::Control;
+use takt_diagnostics::describe;
 use takt_editor::dap::{self, LaunchedSession, Launcher, Message};
 use takt_editor::wire::{self, WireError};
 
@@ -216,7 +217,7 @@ impl Launcher for CommandLine {
             text.trim().trim_start_matches("error: ").to_owned()
         })?;
         let OpenedSession { console, note, files } =
-            debug::open(&parsed.debug, control, false).map_err(|error| describe(&error))?;
+            debug::open(&parsed.debug, control, false).map_err(|error| describe(error.as_ref()))?;
         Ok(LaunchedSession { console, note, folders: files.iter().map(|file| folder(file)).collect() })
     }
 }

@@ -258,7 +258,7 @@ fn verdict(runs: &[BatchRun], loaded: &LoadedProgram, color: bool) -> Result<()>
                 fault::located_error(anyhow::Error::from(error.clone()).context(context), loaded, color);
             match error.downcast_ref::<Failure>() {
                 Some(Failure::Diagnostics(text)) => output::message(text),
-                _ => output::error(&output::describe(&error), color),
+                _ => output::error(&takt_diagnostics::describe(error.as_ref()), color),
             }
         }
     }

@@ -8,10 +8,8 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use takt_debug::inputs;
+use takt_debug::parameters::{bits, parse};
 use takt_isa::Program;
-use takt_isa::program::Port;
-use toml::Value;
 
 /// Largest file of parameters, in bytes.
 const FILE_BYTES: usize = 1 << 20;
@@ -49,7 +47,7 @@ impl ParameterArguments {
     /// Sets the parameters of a program.
     pub(crate) fn set(&self, program: &mut Program) -> Result<()> {
         for (name, text) in self.settings()? {
-            let bits = bits(program.parameter(&name)?, &text)?;
+            let bits = bits(program.parameter(&name)?, &text).map_err(|text| anyhow!("{text}"))?;
             program.set_parameter(&name, bits)?;
         }
         Ok(())
@@ -78,7 +76,7 @@ impl ParameterArguments {
                 );
             };
             for program in [Arc::make_mut(&mut cores[core].program), &mut system.programs[core].program] {
-                let bits = bits(program.parameter(&own)?, &text)?;
+                let bits = bits(program.parameter(&own)?, &text).map_err(|text| anyhow!("{text}"))?;
                 program.set_parameter(&own, bits)?;
             }
         }
@@ -86,41 +84,10 @@ impl ParameterArguments {
     }
 }
 
-/// Bits of a parameter's value in text.
-pub(crate) fn bits(parameter: &Port, text: &str) -> Result<u32> {
-    inputs::parse(parameter.ty, text).map_err(|error| anyhow!("parameter `{}`: {error}", parameter.name))
-}
-
 /// Names and texts of values in a file of parameters.
 pub(crate) fn read(path: &Path) -> Result<Vec<(String, String)>> {
     let name = files::input_name(path);
     let text = String::from_utf8(files::read(path, FILE_BYTES)?)
         .map_err(|_| anyhow!("{name} is not text: parameters are lines `name = value`"))?;
-    parse(&name, &text)
-}
-
-/// Names and texts of values in the text of a file of parameters.
-pub(crate) fn parse(name: &str, text: &str) -> Result<Vec<(String, String)>> {
-    let table: toml::Table = toml::from_str(text).map_err(|error| anyhow!("{name}: {error}"))?;
-    let mut settings = Vec::new();
-    let mut put = |parameter: String, value: &Value| {
-        let text = match value {
-            Value::Integer(value) => value.to_string(),
-            Value::Float(value) => value.to_string(),
-            Value::String(text) => text.clone(),
-            _ => bail!("{name}: `{parameter}` is {}, not a number", value.type_str()),
-        };
-        settings.push((parameter, text));
-        Ok(())
-    };
-    for (key, value) in &table {
-        match value {
-            // `servo.kp = 3` is a table in TOML: a core with its parameters.
-            Value::Table(own) => {
-                own.iter().try_for_each(|(own, value)| put(format!("{key}.{own}"), value))?
-            }
-            _ => put(key.clone(), value)?,
-        }
-    }
-    Ok(settings)
+    parse(&name, &text).map_err(|text| anyhow!("{text}"))
 }

@@ -56,26 +56,6 @@ pub(crate) fn note(text: &str) {
     message(&folded(&format!("note: {}", visible(text))));
 }
 
-/// An error with its causes, on one line. A cause that the text of its parent repeats appears once, and numbers of system errors are
-/// removed.
-pub(crate) fn describe(error: &anyhow::Error) -> String {
-    let mut text = String::new();
-    for cause in error.chain().map(ToString::to_string) {
-        if !text.contains(&cause) {
-            let colon = if text.is_empty() { "" } else { ": " };
-            text.push_str(colon);
-            text.push_str(&cause);
-        }
-    }
-    while let Some((before, after)) =
-        text.split_once(" (os error ").map(|(a, b)| (a.to_owned(), b.to_owned()))
-    {
-        let rest = after.split_once(')').map_or("", |(_, rest)| rest);
-        text = before + rest;
-    }
-    text
-}
-
 /// The error is a closed pipe: nothing reads standard output any more.
 pub(crate) fn is_closed_pipe(error: &anyhow::Error) -> bool {
     let is_pipe = |cause: &io::Error| cause.kind() == io::ErrorKind::BrokenPipe;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Subcommand `shadow` of `takt live`: compares a board's outputs with the emulator's for the same inputs, period by period.
 
-use crate::commands::live::value::{find, value_text};
 use crate::terminal::files::Out;
 use crate::terminal::progress::progress;
 use anyhow::{Context, Result, bail};
@@ -13,6 +12,7 @@ use takt_board::{Application, Host};
 use takt_emu::Emulator;
 use takt_isa::timing::Cycle;
 use takt_isa::{Register, Type};
+use takt_live::value::{find, value_text};
 use takt_system::{Description, End, System};
 
 /// Cycle limit until all cores reach their first `wait`.

@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Subcommands `push` and `pop` of `takt live`: transfer entries of FIFOs between host and board.
 
-use super::value::{bits, value_text};
 use crate::terminal::files::Out;
 use anyhow::{Context, Result, anyhow, bail};
 use std::io::Write;
 use takt_board::endpoints::Fifo;
 use takt_board::protocol::Line;
 use takt_board::{Application, Host};
-use takt_system::LinkKind;
-
-/// Capacity of a FIFO, in entries.
-pub(super) fn depth(application: &Application<'_>, fifo: &Fifo) -> u32 {
-    match application.description().links[fifo.link].kind {
-        LinkKind::Fifo { depth, .. } => depth,
-        _ => 0,
-    }
-}
+use takt_live::report::depth;
+use takt_live::value::{bits, value_text};
 
 /// Finds a FIFO by name, in the given direction.
 pub(super) fn of(application: &Application<'_>, name: &str, to_host: bool) -> Result<Fifo> {

@@ -6,31 +6,29 @@ mod fifo;
 mod parameters;
 mod scope;
 mod serve;
-mod status;
-mod value;
 
 use crate::commands::board;
-use crate::commands::live::value::{bits, find, value_text};
 use crate::run::application;
 use crate::run::parameters::ParameterArguments;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number;
 use crate::terminal::options::{OptionalMachine, SourceArguments};
 use crate::terminal::progress::progress;
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, Subcommand};
-use serde::Deserialize;
-use serve::Target;
-use status::Report;
+use serve::Served;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use takt_board::endpoints::Fifo;
-use takt_board::protocol::{ENABLE, HOLD, LinkError, RESTART, RUN};
+use takt_board::protocol::{ENABLE, HOLD, RESTART, RUN};
 use takt_board::scope::Setup;
 use takt_board::serial::Serial;
 use takt_board::top::image;
 use takt_board::{Application, Host, Stream, Wiring};
+use takt_live::report::Report;
+use takt_live::value::{find, value_text};
+use takt_live::{Control, set, setting};
 
 /// A board's serial port.
 #[derive(Args)]
@@ -267,22 +265,6 @@ fn prepare(
     })
 }
 
-/// Address and bits of a value that the host is to set.
-fn setting(
-    application: &Application<'_>,
-    wiring: Option<&Wiring>,
-    name: &str,
-    text: &str,
-) -> Result<(u16, u32)> {
-    let (address, ty) = application.settable(name).map_err(|text| anyhow!("{text}"))?;
-    let bits = bits(text, ty).with_context(|| format!("`{text}` is not a value of `{name}`"))?;
-    application.check_parameter(name, bits)?;
-    if let Some(driver) = wiring.and_then(|wiring| wiring.driver(application, address)) {
-        bail!("`{name}` cannot be set: the wiring connects it to {driver}, which drives it");
-    }
-    Ok((address, bits))
-}
-
 pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
     if let Command::Param { load: Some(load), save: Some(save), .. } = &arguments.command {
         files::check(&[("--load", load.as_path())], &[("--save", save.as_path())])?;
@@ -305,7 +287,8 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
     }
     match &arguments.command {
         Command::Status => {
-            Report::read(&mut host, application.as_ref(), wiring.as_ref())?.print(out)?;
+            let report = Report::read(&mut host, application.as_ref(), wiring.as_ref())?;
+            write!(out, "{report}")?;
         }
         Command::Start => Control::Start.send(&mut host)?,
         Command::Stop => Control::Stop.send(&mut host)?,
@@ -361,9 +344,9 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
             if let (PreparedCommand::Serve(address), Some(file), Some(loaded), Some(application)) =
                 (prepared, &arguments.program, &carried, &application)
             {
-                let target =
-                    Target { port: &arguments.port, file, loaded, application, wiring: wiring.as_ref() };
-                serve::run(host, &target, address, out)?;
+                let served =
+                    Served { port: &arguments.port, file, loaded, application, wiring: wiring.as_ref() };
+                serve::run(host, &served, address, out)?;
             }
         }
         Command::Stream { names, every, count } => {
@@ -373,47 +356,6 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Command that starts, stops or holds the program.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Control {
-    Start,
-    Stop,
-    Hold,
-    Step,
-    Go,
-}
-
-impl Control {
-    fn send(self, host: &mut Host<Serial>) -> Result<()> {
-        let control = match self {
-            Control::Start => RUN | ENABLE | RESTART,
-            Control::Stop => 0,
-            Control::Hold => host.register("control")? | HOLD,
-            Control::Go => host.register("control")? & !HOLD,
-            Control::Step => {
-                let held = host.register("control")? & HOLD != 0;
-                ensure!(held, "the program is not held: `takt live PORT hold` first");
-                return Ok(host.set("step", 1)?);
-            }
-        };
-        Ok(host.set("control", control)?)
-    }
-}
-
-/// Sets ports; the error names ports that the board does not let the host set.
-fn set(host: &mut Host<Serial>, settings: &[(u16, u32)], names: &[(u16, String)]) -> Result<()> {
-    host.set_ports(settings).map_err(|error| {
-        let LinkError::ReadOnly { address, words } = error else { return error.into() };
-        let refused = names.iter().filter(|(at, _)| (address..).take(words).any(|refused| refused == *at));
-        let refused: Vec<String> = refused.map(|(_, name)| format!("`{name}`")).collect();
-        anyhow!(
-            "the board refuses to set {}: a peripheral of its wiring drives it (`--wiring FILE` says which)",
-            refused.join(" or ")
-        )
-    })
 }
 
 /// Prints a head line, then the values of `count` stream frames, each line as it comes.

@@ -17,8 +17,8 @@ use std::time::{Duration, Instant};
 use takt_board::protocol::{HOLD, Line, RUN};
 use takt_board::scope::{MOST_EVERY, Recording, Scope, ScopeState, Setup};
 use takt_board::{Application, Host, Wiring};
-use takt_debug::value;
 use takt_isa::Type;
+use takt_live::recording::{cells, summary, table};
 
 /// Pause between two questions whether the recording is done.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -174,25 +174,6 @@ fn wait<L: Line>(host: &mut Host<L>, scope: &Scope, setup: &Setup, limit: Option
     }
 }
 
-/// The recording in a line.
-pub(super) fn summary(recording: &Recording) -> String {
-    let [first, .., last] = recording.periods[..] else {
-        return "1 sample".to_owned();
-    };
-    let mut text = format!(
-        "{} samples of {} channels, period {first} to {last}",
-        recording.periods.len(),
-        recording.channels.len()
-    );
-    if let Some((_, period)) = recording.trigger {
-        let _ = write!(text, "; triggered in period {period}: {}", recording.causes.join(" and "));
-    }
-    if recording.is_stopped {
-        text.push_str("; the last sample is what the program left when it stopped");
-    }
-    text
-}
-
 fn write(
     recording: &Recording,
     arguments: &ScopeArguments,
@@ -227,30 +208,6 @@ fn write(
         None => {}
     }
     Ok(())
-}
-
-/// The values of a sample as text; a channel without a value has none.
-fn cells(recording: &Recording, row: usize) -> impl Iterator<Item = String> {
-    let channels = recording.channels.iter().zip(&recording.values);
-    channels.map(move |((_, ty), values)| values[row].map_or(String::new(), |bits| value::text(*ty, bits)))
-}
-
-/// A table with a row for each sample.
-pub(super) fn table(recording: &Recording) -> String {
-    let mut text = "period".to_owned();
-    for (name, _) in &recording.channels {
-        let quote = if name.contains(',') { "\"" } else { "" };
-        let _ = write!(text, ",{quote}{name}{quote}");
-    }
-    text.push('\n');
-    for (row, period) in recording.periods.iter().enumerate() {
-        let _ = write!(text, "{period}");
-        for cell in cells(recording, row) {
-            let _ = write!(text, ",{cell}");
-        }
-        text.push('\n');
-    }
-    text
 }
 
 /// A value-change dump; `period` is a period's length in ns.
@@ -333,11 +290,6 @@ mod tests {
             causes: vec!["`x > 1`".to_owned()],
             is_stopped: true,
         }
-    }
-
-    #[test]
-    fn a_table_leaves_cells_without_values_empty() {
-        assert_eq!(table(&recording()), "period,x,\"P[1,2]\"\n7,,3\n9,1.5,-1\n10,NaN,-1\n");
     }
 
     #[test]

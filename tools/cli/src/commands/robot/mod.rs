@@ -18,6 +18,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use summary::Summary;
 use takt_asm::diag::{Diagnostics, Message as Mistake};
+use takt_diagnostics::describe;
 use takt_robot::controller::{Controller, standard};
 use takt_robot::host::{Event, LinkFault};
 use takt_robot::level::{Answer, Files, Message, Session};
@@ -93,12 +94,12 @@ struct DiskFiles;
 impl Files for DiskFiles {
     fn read(&self, name: &str) -> Result<String, String> {
         let path = Path::new(name);
-        let bytes = files::read(path, limits::PROGRAM_BYTES).map_err(|error| output::describe(&error))?;
+        let bytes = files::read(path, limits::PROGRAM_BYTES).map_err(|error| describe(error.as_ref()))?;
         String::from_utf8(bytes).map_err(|_| format!("{name} is not UTF-8 text"))
     }
 
     fn write(&self, name: &str, text: &str) -> Result<(), String> {
-        files::write(Path::new(name), text.as_bytes()).map_err(|error| output::describe(&error))
+        files::write(Path::new(name), text.as_bytes()).map_err(|error| describe(error.as_ref()))
     }
 }
 

@@ -30,9 +30,10 @@ const CONNECTIONS: usize = 64;
 const WAITING: usize = 256;
 
 /// Files of the page: name, media type, contents.
-const FILES: [(&str, &str, &str); 6] = [
+const FILES: [(&str, &str, &str); 7] = [
     ("", "text/html", include_str!("../../../../../web/page/live/index.html")),
     ("live.js", "text/javascript", include_str!("../../../../../web/page/live/live.js")),
+    ("line.js", "text/javascript", include_str!("../../../../../web/page/live/line.js")),
     ("chart.js", "text/javascript", include_str!("../../../../../web/page/live/chart.js")),
     ("parts.js", "text/javascript", include_str!("../../../../../web/page/src/parts.js")),
     ("style.css", "text/css", include_str!("../../../../../web/page/src/style.css")),

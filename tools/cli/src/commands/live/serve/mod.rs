@@ -5,10 +5,7 @@
 //! that knows only its socket.
 
 mod connection;
-mod message;
-mod recorder;
 mod server;
-mod shown;
 
 use super::Port;
 use crate::run::application::Application as Loaded;
@@ -24,6 +21,7 @@ use std::sync::Arc;
 use std::sync::mpsc;
 use takt_board::serial::Serial;
 use takt_board::{Application, Host, Wiring};
+use takt_live::Target;
 
 /// Options of `takt live serve`.
 #[derive(Args)]
@@ -64,7 +62,7 @@ impl Address {
 }
 
 /// The board that pages show, and the program that runs there.
-pub(super) struct Target<'a> {
+pub(super) struct Served<'a> {
     pub(super) port: &'a Port,
     /// File of the program.
     pub(super) file: &'a Path,
@@ -73,11 +71,24 @@ pub(super) struct Target<'a> {
     pub(super) wiring: Option<&'a Wiring>,
 }
 
+/// The board for a session, which owns its parts.
+fn target(served: &Served<'_>) -> Target {
+    let Served { port, file, loaded, application, wiring } = *served;
+    Target {
+        program: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        port: port.port.display().to_string(),
+        baud: port.baud,
+        application: application.clone().into_owned(),
+        sources: loaded.programs().iter().map(|loaded| loaded.sources.clone()).collect(),
+        wiring: wiring.cloned(),
+    }
+}
+
 /// Prints the page's address, then serves it until the process is interrupted.
-pub(super) fn run(host: Host<Serial>, target: &Target<'_>, address: Address, out: &mut Out) -> Result<()> {
+pub(super) fn run(host: Host<Serial>, served: &Served<'_>, address: Address, out: &mut Out) -> Result<()> {
     let Address { listener, port, token } = address;
     let (events, received) = mpsc::channel();
-    let mut server = Server::new(host, target, received)?;
+    let mut server = Server::new(host, served, received)?;
     writeln!(out, "http://127.0.0.1:{port}/{token}/")?;
     out.flush()?;
     let gate = Arc::new(Gate::new(port, token));

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! State of the cores, FIFOs and counters of a board: the subcommand `status` of `takt live`, and part of what its page shows.
+//! State of the cores, FIFOs and counters of a board.
 
-use super::fifo::depth;
-use crate::terminal::files::Out;
-use anyhow::Result;
 use serde::Serialize;
-use std::io::Write;
+use std::fmt;
+use takt_board::endpoints::Fifo;
 use takt_board::host::Status;
 use takt_board::protocol::{HOLD, Line, LinkError, RUN};
 use takt_board::{Application, Host, Wiring};
+use takt_system::LinkKind;
 
 /// Registers that one request reads.
 const REGISTERS: [&str; 9] =
@@ -16,7 +15,7 @@ const REGISTERS: [&str; 9] =
 
 /// State of a board.
 #[derive(Serialize)]
-pub(super) struct Report {
+pub struct Report {
     /// The program or system, in a few words: `the program runs`.
     state: String,
     runs: bool,
@@ -48,7 +47,10 @@ struct CoreReport {
 
 impl Report {
     /// Reads the state from a board, with names if the application is known.
-    pub(super) fn read<L: Line>(
+    ///
+    /// # Errors
+    /// If the board refuses, or is gone.
+    pub fn read<L: Line>(
         host: &mut Host<L>,
         application: Option<&Application<'_>>,
         wiring: Option<&Wiring>,
@@ -111,30 +113,39 @@ impl Report {
             lost,
         })
     }
+}
 
-    /// Prints the state.
-    pub(super) fn print(&self, out: &mut Out) -> Result<()> {
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let drive = match self.safe[..] {
             [] => "drive".to_owned(),
             _ => format!("are safe: {}", self.safe.join("; ")),
         };
-        writeln!(out, "{}; outputs {drive}", self.state)?;
+        writeln!(f, "{}; outputs {drive}", self.state)?;
         for trip in &self.trips {
-            writeln!(out, "  {trip}")?;
+            writeln!(f, "  {trip}")?;
         }
         for CoreReport { name, periods, misses, cycles, most_cycles, halted, fault } in &self.cores {
             let title = if name.is_empty() { String::new() } else { format!("{name}: ") };
             let halted = if *halted { ", halted" } else { "" };
             let fault = fault.map_or(String::new(), |bundle| format!(", fault at bundle {bundle}"));
             writeln!(
-                out,
+                f,
                 "  {title}periods {periods}, misses {misses}, cycles {cycles}, most_cycles {most_cycles}{halted}{fault}"
             )?;
         }
         for fifo in &self.fifos {
-            writeln!(out, "  {fifo}")?;
+            writeln!(f, "  {fifo}")?;
         }
-        writeln!(out, "{:<12} {}", "errors", self.errors)?;
-        Ok(writeln!(out, "{:<12} {}", "lost", self.lost)?)
+        writeln!(f, "{:<12} {}", "errors", self.errors)?;
+        writeln!(f, "{:<12} {}", "lost", self.lost)
+    }
+}
+
+/// Capacity of a FIFO, in entries.
+pub fn depth(application: &Application<'_>, fifo: &Fifo) -> u32 {
+    match application.description().links[fifo.link].kind {
+        LinkKind::Fifo { depth, .. } => depth,
+        _ => 0,
     }
 }

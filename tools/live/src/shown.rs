@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Values that a page shows: parameters, inputs and outputs, each with unit, range, and whether the host can set it.
 
-use super::Target;
-use crate::commands::live::value::{find, value_text};
-use crate::run::loaded_program::LoadedProgram;
+use crate::session::Target;
+use crate::value::{find, value_text};
 use anyhow::Result;
 use serde::Serialize;
 use takt_asm::units::unit;
@@ -12,11 +11,11 @@ use takt_board::protocol::{Line, LinkError};
 use takt_debug::value;
 use takt_isa::program::Port;
 use takt_isa::{Program, Type};
-use takt_system::{End, SystemPort};
+use takt_system::{Core, End, SystemPort};
 
 /// A value, as the page describes it.
 #[derive(Serialize)]
-pub(super) struct Shown {
+pub(crate) struct Shown {
     name: String,
     #[serde(rename = "type")]
     ty: &'static str,
@@ -28,12 +27,12 @@ pub(super) struct Shown {
 }
 
 /// All values, and their places on the board.
-pub(super) struct Values {
-    pub(super) parameters: Vec<Shown>,
-    pub(super) inputs: Vec<Shown>,
-    pub(super) outputs: Vec<Shown>,
+pub(crate) struct Values {
+    pub(crate) parameters: Vec<Shown>,
+    pub(crate) inputs: Vec<Shown>,
+    pub(crate) outputs: Vec<Shown>,
     /// Names that may be channels of the scope.
-    pub(super) channels: Vec<String>,
+    pub(crate) channels: Vec<String>,
     places: Vec<(u16, Type)>,
     /// The places in ascending order, which takes the fewest requests.
     order: Vec<usize>,
@@ -48,11 +47,11 @@ struct Known<'p> {
 }
 
 /// Ports of all cores by the name of the core's port.
-fn ports<'p>(target: &Target<'p>, directive: &'static str, ports: fn(&Program) -> &[Port]) -> Vec<Known<'p>> {
-    let cores = target.loaded.programs().iter().enumerate();
-    let of = |(core, loaded): (usize, &'p LoadedProgram)| {
+fn ports<'p>(target: &'p Target, directive: &'static str, ports: fn(&Program) -> &[Port]) -> Vec<Known<'p>> {
+    let cores = target.application.description().cores.iter().enumerate();
+    let of = |(core, known): (usize, &'p Core)| {
         let name = move |port: &Port| target.application.name(core, &port.name);
-        ports(&loaded.program)
+        ports(&known.program)
             .iter()
             .map(|port| Known { core, directive, port, name: name(port) })
             .collect::<Vec<_>>()
@@ -61,15 +60,15 @@ fn ports<'p>(target: &Target<'p>, directive: &'static str, ports: fn(&Program) -
 }
 
 /// Ports of cores at the other ends of a system's links from or to the host, by the name of the host's end.
-fn ends<'p>(target: &Target<'p>, is_input: bool) -> Vec<Known<'p>> {
+fn ends(target: &Target, is_input: bool) -> Vec<Known<'_>> {
     let (description, ends) = (target.application.description(), target.application.endpoints());
     let ends = if is_input { &ends.inputs } else { &ends.outputs };
     let known = |end: &SystemPort| {
-        let (link, programs) = (&description.links[end.link], target.loaded.programs());
+        let link = &description.links[end.link];
         let field = &link.fields[end.field];
         let (other, port) = if is_input { (link.to, &field.to) } else { (link.from, &field.from) };
         let End::Core(core) = other else { return None };
-        let program = &programs[core].program;
+        let program = &description.cores[core].program;
         let (directive, all) =
             if is_input { (".input", &program.inputs) } else { (".output", &program.outputs) };
         let port = all.iter().find(|known| known.name == *port)?;
@@ -79,8 +78,8 @@ fn ends<'p>(target: &Target<'p>, is_input: bool) -> Vec<Known<'p>> {
 }
 
 impl Values {
-    pub(super) fn of(target: &Target<'_>) -> Result<Values> {
-        let Target { application, wiring, loaded, .. } = *target;
+    pub(crate) fn of(target: &Target) -> Result<Values> {
+        let Target { application, wiring, sources, .. } = target;
         let mut places = Vec::new();
         let mut all = |known: Vec<Known<'_>>| -> Result<Vec<Shown>> {
             let mut shown = Vec::new();
@@ -89,14 +88,15 @@ impl Values {
                 let fixed = match application.settable(&name) {
                     Err(text) => Some(text),
                     Ok((address, _)) => wiring
+                        .as_ref()
                         .and_then(|wiring| wiring.driver(application, address))
                         .map(|driver| format!("the wiring connects `{name}` to {driver}, which drives it")),
                 };
-                let LoadedProgram { program, sources, .. } = &loaded.programs()[core];
+                let program = &application.description().cores[core].program;
                 let range = program.range(port.register);
                 let range =
                     range.map(|range| [range.low, range.high].map(|bits| value::text(range.ty, bits)));
-                let unit = unit(sources, directive, &port.name);
+                let unit = sources.get(core).and_then(|sources| unit(sources, directive, &port.name));
                 shown.push(Shown { name, ty: port.ty.name(), unit, range, fixed });
             }
             Ok(shown)
@@ -114,7 +114,7 @@ impl Values {
         };
         let (inputs, outputs) = (all(inputs)?, all(outputs)?);
         let mut channels = Vec::new();
-        for (core, LoadedProgram { program, .. }) in loaded.programs().iter().enumerate() {
+        for (core, Core { program, .. }) in application.description().cores.iter().enumerate() {
             let all = program.host_registers().chain(&program.outputs).chain(&program.registers);
             channels.extend(all.map(|port| application.name(core, &port.name)));
         }
@@ -124,7 +124,7 @@ impl Values {
     }
 
     /// Reads all values, as text: parameters, then inputs, then outputs.
-    pub(super) fn read<L: Line>(&self, host: &mut Host<L>) -> Result<Vec<String>, LinkError> {
+    pub(crate) fn read<L: Line>(&self, host: &mut Host<L>) -> Result<Vec<String>, LinkError> {
         let addresses: Vec<u16> = self.order.iter().map(|at| self.places[*at].0).collect();
         let mut texts = vec![String::new(); self.places.len()];
         for (at, bits) in self.order.iter().zip(host.read_each(&addresses)?) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Messages between the server and its pages, as JSON.
+//! Messages between a session and its pages, as JSON.
 
-use super::shown::Shown;
-use crate::commands::live::Control;
-use crate::commands::live::status::Report;
+use crate::control::Control;
+use crate::report::Report;
+use crate::shown::Shown;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use takt_isa::Type;
 /// Message to a page.
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
-pub(super) enum ToPage<'a> {
+pub(crate) enum ToPage<'a> {
     /// The program, and names that never change.
     Hello {
         version: &'static str,
@@ -51,7 +51,7 @@ pub(super) enum ToPage<'a> {
 }
 
 impl ToPage<'_> {
-    pub(super) fn text(&self) -> Arc<str> {
+    pub(crate) fn text(&self) -> Arc<str> {
         // Keys are strings and numbers finite: there is nothing that JSON cannot say.
         serde_json::to_string(self).unwrap_or_default().into()
     }
@@ -59,14 +59,14 @@ impl ToPage<'_> {
 
 /// Size of the board's scope.
 #[derive(Clone, Copy, Serialize)]
-pub(super) struct ScopeSize {
-    pub(super) channels: u32,
-    pub(super) depth: u32,
+pub(crate) struct ScopeSize {
+    pub(crate) channels: u32,
+    pub(crate) depth: u32,
 }
 
 /// Name and type of a channel.
 #[derive(Serialize)]
-pub(super) struct Named<'a> {
+pub(crate) struct Named<'a> {
     name: &'a str,
     #[serde(rename = "type")]
     ty: &'static str,
@@ -75,7 +75,7 @@ pub(super) struct Named<'a> {
 /// Phase of the scope.
 #[derive(Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Phase {
+pub(crate) enum Phase {
     Rest,
     Armed,
     Triggered,
@@ -85,7 +85,7 @@ pub(super) enum Phase {
 /// Sample of a channel.
 #[derive(Serialize)]
 #[serde(untagged)]
-pub(super) enum Cell {
+pub(crate) enum Cell {
     Float(f32),
     Integer(i32),
     Bits(u32),
@@ -106,7 +106,7 @@ impl Cell {
 }
 
 /// Message with a recording.
-pub(super) fn recording(recording: &Recording, summary: &str, seconds: Option<f64>) -> Arc<str> {
+pub(crate) fn recording(recording: &Recording, summary: &str, seconds: Option<f64>) -> Arc<str> {
     let Recording { channels, periods, values, trigger, .. } = recording;
     let cells = |(values, (_, ty)): (&Vec<Option<u32>>, &(String, Type))| {
         values.iter().map(|bits| Some(Cell::of(*ty, (*bits)?))).collect()
@@ -124,17 +124,17 @@ pub(super) fn recording(recording: &Recording, summary: &str, seconds: Option<f6
 
 /// Message from a page.
 #[derive(Deserialize)]
-pub(super) struct FromPage {
+pub(crate) struct FromPage {
     /// Number for the answer.
-    pub(super) id: u64,
+    pub(crate) id: u64,
     #[serde(flatten)]
-    pub(super) wish: Wish,
+    pub(crate) wish: Wish,
 }
 
 /// Request of a page.
 #[derive(Deserialize)]
 #[serde(tag = "do", rename_all = "lowercase")]
-pub(super) enum Wish {
+pub(crate) enum Wish {
     /// Take control, if no page has it.
     Claim,
     /// Give control up.
@@ -169,19 +169,19 @@ pub(super) enum Wish {
 
 impl Wish {
     /// A page that only shows may ask for it.
-    pub(super) fn is_harmless(&self) -> bool {
+    pub(crate) fn is_harmless(&self) -> bool {
         matches!(self, Wish::Claim | Wish::Save | Wish::Csv)
     }
 }
 
 /// Recording that a page asks for; names and triggers as `takt live scope` takes them.
 #[derive(Clone, Deserialize, Serialize)]
-pub(super) struct Request {
-    pub(super) channels: Vec<String>,
-    pub(super) triggers: Vec<String>,
-    pub(super) every: u32,
-    pub(super) samples: Option<u32>,
-    pub(super) before: Option<u32>,
+pub(crate) struct Request {
+    pub(crate) channels: Vec<String>,
+    pub(crate) triggers: Vec<String>,
+    pub(crate) every: u32,
+    pub(crate) samples: Option<u32>,
+    pub(crate) before: Option<u32>,
     /// Arm again after each recording.
-    pub(super) repeat: bool,
+    pub(crate) repeat: bool,
 }

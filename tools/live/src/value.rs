@@ -6,13 +6,16 @@ use takt_board::Application;
 use takt_isa::Type;
 
 /// Address and type of a port.
-pub(super) fn find(application: &Application<'_>, name: &str) -> Result<(u16, Type)> {
+///
+/// # Errors
+/// If there is no such port.
+pub fn find(application: &Application<'_>, name: &str) -> Result<(u16, Type)> {
     let place = application.find(name).map_err(|text| anyhow!("{text}"))?;
     Ok((place.read, place.ty))
 }
 
 /// Text of a port's value.
-pub(super) fn value_text(bits: u32, ty: Type) -> String {
+pub fn value_text(bits: u32, ty: Type) -> String {
     match ty {
         Type::F => f32::from_bits(bits).to_string(),
         Type::I => (bits as i32).to_string(),
@@ -21,7 +24,7 @@ pub(super) fn value_text(bits: u32, ty: Type) -> String {
 }
 
 /// Bits of a value in text; `None` if it is none of the type.
-pub(super) fn bits(text: &str, ty: Type) -> Option<u32> {
+pub fn bits(text: &str, ty: Type) -> Option<u32> {
     match ty {
         Type::F => text.parse::<f32>().ok().map(f32::to_bits),
         Type::I => text.parse::<i32>().ok().map(|n| n as u32),

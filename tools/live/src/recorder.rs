@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The scope of the board, as pages use it: armed once or again and again, watched without waiting, read in parts.
 
-use super::message::{self, Phase, Request, ScopeSize, ToPage};
-use crate::commands::live::scope::{summary, table};
+use crate::message::{self, Phase, Request, ScopeSize, ToPage};
+use crate::recording::{summary, table};
 use anyhow::{Result, anyhow, bail};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ struct Armed {
 
 /// The scope and its last recording.
 #[derive(Default)]
-pub(super) struct Recorder {
+pub(crate) struct Recorder {
     /// The scope of the board; `None` if its circuit has none.
     scope: Option<Scope>,
     armed: Option<Armed>,
@@ -34,7 +34,7 @@ pub(super) struct Recorder {
 
 impl Recorder {
     /// Looks at a board that has just been connected. One that was under power before may still be armed.
-    pub(super) fn attach<L: Line>(&mut self, host: &mut Host<L>) -> Result<(), ScopeError> {
+    pub(crate) fn attach<L: Line>(&mut self, host: &mut Host<L>) -> Result<(), ScopeError> {
         self.scope = match host.scope() {
             Ok(scope) => Some(scope),
             Err(ScopeError::None) => None,
@@ -47,16 +47,16 @@ impl Recorder {
         Ok(())
     }
 
-    pub(super) fn size(&self) -> Option<ScopeSize> {
+    pub(crate) fn size(&self) -> Option<ScopeSize> {
         self.scope.map(|Scope { channels, depth, .. }| ScopeSize { channels, depth })
     }
 
-    pub(super) fn recording(&self) -> Option<&Arc<str>> {
+    pub(crate) fn recording(&self) -> Option<&Arc<str>> {
         self.message.as_ref()
     }
 
     /// Message about the phase, for all pages.
-    pub(super) fn phase(&self, passed: usize, all: usize) -> Arc<str> {
+    pub(crate) fn phase(&self, passed: usize, all: usize) -> Arc<str> {
         let (phase, text) = match &self.armed {
             Some(Armed { phase, setup, .. }) => (*phase, setup.triggers()),
             None => (Phase::Rest, self.failure.clone().unwrap_or_default()),
@@ -64,7 +64,7 @@ impl Recorder {
         ToPage::Scope { phase, text: &text, passed, all, request: self.request.as_ref() }.text()
     }
 
-    pub(super) fn arm<L: Line>(
+    pub(crate) fn arm<L: Line>(
         &mut self,
         host: &mut Host<L>,
         application: &Application<'_>,
@@ -88,7 +88,7 @@ impl Recorder {
     }
 
     /// Ends the recording: what there is will be read.
-    pub(super) fn end<L: Line>(&mut self, host: &mut Host<L>) -> Result<()> {
+    pub(crate) fn end<L: Line>(&mut self, host: &mut Host<L>) -> Result<()> {
         let Some(armed) = &mut self.armed else { bail!("no recording is under way") };
         armed.request.repeat = false;
         Ok(host.end_scope()?)
@@ -96,7 +96,7 @@ impl Recorder {
 
     /// Looks after the recording; `passed` gets the words that have come, and of all, and says whether to go on reading. Returns what pages
     /// are to be told.
-    pub(super) fn watch<L: Line>(
+    pub(crate) fn watch<L: Line>(
         &mut self,
         host: &mut Host<L>,
         application: &Application<'_>,
@@ -141,7 +141,7 @@ impl Recorder {
     }
 
     /// The last recording as CSV.
-    pub(super) fn csv(&self) -> Result<String> {
+    pub(crate) fn csv(&self) -> Result<String> {
         self.recording.as_ref().map(table).ok_or_else(|| anyhow!("there is no recording yet"))
     }
 }
