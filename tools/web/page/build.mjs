@@ -1,14 +1,14 @@
-// Bundles the page: `node build.mjs TAKT.WASM OUT`.
+// Bundles the page, and that of a board at a serial port: `node build.mjs TAKT.WASM LIVE.WASM OUT`.
 import zopfli from "@gfx/zopfli";
 import { build } from "esbuild";
 import { cpSync, mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { join, relative, resolve } from "node:path";
+import { basename, join, relative, resolve } from "node:path";
 import { promisify } from "node:util";
 import { gzipSync } from "node:zlib";
 import { asking } from "./ask.mjs";
 import { PERIODS, WHICH, collect, shipped } from "./src/collect.js";
 
-const [wasm, out] = process.argv.slice(2).map((path) => resolve(path));
+const [wasm, live, out] = process.argv.slice(2).map((path) => resolve(path));
 const page = import.meta.dirname;
 /** Periods of a drive in a call, and digits of a pose that is drawn. */
 const SLICE = 20_000, DIGITS = 7;
@@ -38,6 +38,16 @@ console.log(`${"first screen".padEnd(26)} ${" ".repeat(16)} ${String(total).padS
 const LIMIT = 2_000_000, ALL = 4_000_000;
 if (total >= LIMIT) fail(`the page has ${total} bytes compressed; it may have ${LIMIT}`);
 total += [...outputs.keys()].filter((name) => !first.has(name)).reduce((sum, name) => sum + weigh(name), 0);
+// The page of a board: that of `takt live serve`, whose server has all files in one folder, with a line of its own to the port.
+const files = { "line.js": "live/serial.js", "parts.js": "src/parts.js" };
+const serial = { name: "serial", setup: (made) => made.onResolve({ filter: /\/(line|parts)\.js$/ }, ({ path }) => ({ path: join(page, files[basename(path)]) })) };
+await build({
+  entryPoints: [join(page, "live/live.js"), join(page, "live/serial-worker.js")],
+  outdir: join(out, "live"), bundle: true, minify: true, format: "esm", target: "es2022", legalComments: "eof", logLevel: "warning", plugins: [serial],
+});
+for (const name of ["live/index.html", "live/live.css", "src/style.css"]) cpSync(join(page, name), join(out, "live", basename(name)));
+writeFileSync(join(out, "live/live.wasm.gz"), await promisify(zopfli.gzip)(bare(readFileSync(live)), { numiterations: 1 }));
+total += ["live.js", "serial-worker.js", "live.css", "style.css", "index.html", "live.wasm.gz"].reduce((sum, name) => sum + weigh(`live/${name}`), 0);
 // Results of the examples, and a drive of the robot, so that no panel waits for the machine in the browser.
 mkdirSync(join(out, "ahead"), { recursive: true });
 const call = await asking(readFileSync(wasm));

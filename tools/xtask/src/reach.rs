@@ -37,6 +37,7 @@ const LIBRARIES: &[&str] = &[
     "takt-family",
     "takt-rtl",
     "takt-editor",
+    "takt-live",
     "takt-web",
 ];
 

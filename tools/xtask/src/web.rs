@@ -32,9 +32,11 @@ pub(crate) const PAGE: &str = "target/playground";
 const TARGET: &str = "target/web";
 /// The compiled module.
 const COMPILED: &str = "target/web/wasm32-unknown-unknown/release/takt_web.wasm";
+/// The compiled module of the page of a board.
+const LIVE: &str = "target/web/wasm32-unknown-unknown/release/takt_live.wasm";
 
 /// Cargo settings for a small download: optimisation for size, most of all of what runs rarely, and link-time optimisation.
-const SMALL: [&str; 15] = [
+const SMALL: [&str; 17] = [
     "profile.release.opt-level=\"s\"",
     "profile.release.lto=\"fat\"",
     "profile.release.codegen-units=1",
@@ -47,6 +49,8 @@ const SMALL: [&str; 15] = [
     "profile.release.package.takt-robot.opt-level=\"z\"",
     "profile.release.package.takt-rtl.opt-level=\"z\"",
     "profile.release.package.takt-web.opt-level=\"z\"",
+    "profile.release.package.takt-live.opt-level=\"z\"",
+    "profile.release.package.takt-board.opt-level=\"z\"",
     "profile.release.package.toml.opt-level=\"z\"",
     "profile.release.package.serde_json.opt-level=\"z\"",
     "profile.release.package.lsp-types.opt-level=\"z\"",
@@ -66,17 +70,27 @@ pub(crate) fn web(arguments: &Arguments) -> Result<()> {
 /// Builds the playground's page.
 pub(crate) fn build() -> Result<()> {
     // One type of crate: cargo optimises no library at link time that is also compiled for other crates.
-    let mut compile = Toolchain::find(&[WASM])?.cargo("rustc", WASM, TARGET);
-    compile.args(["--release", "-p", "takt-web", "--crate-type", "cdylib"]);
-    // The project's profile favours compile time; the page favours size. Hot crates keep their optimisation level.
-    for small in SMALL {
-        compile.args(["--config", small]);
+    let toolchain = Toolchain::find(&[WASM])?;
+    for (package, what) in
+        [("takt-web", "compiling the playground"), ("takt-live", "compiling the page of a board")]
+    {
+        let mut compile = toolchain.cargo("rustc", WASM, TARGET);
+        compile.args(["--release", "-p", package, "--crate-type", "cdylib"]);
+        // The project's profile favours compile time; the page favours size. Hot crates keep their optimisation level.
+        for small in SMALL {
+            compile.args(["--config", small]);
+        }
+        // Link-time optimisation is a minute or more without a line of cargo's.
+        progress::step(what, || run(&mut compile))?;
     }
-    // Link-time optimisation is a minute or more without a line of cargo's.
-    progress::step("compiling the playground", || run(&mut compile))?;
     let page = packages()?;
     let mut bundle = Command::new("node");
-    bundle.arg("build.mjs").arg(root().join(COMPILED)).arg(root().join(PAGE)).current_dir(page);
+    bundle
+        .arg("build.mjs")
+        .arg(root().join(COMPILED))
+        .arg(root().join(LIVE))
+        .arg(root().join(PAGE))
+        .current_dir(page);
     progress::step("bundling the playground", || run(&mut bundle))?;
     eprintln!(
         "the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000"

@@ -1,5 +1,7 @@
-// The page of `takt live serve`: what a board does, and, on one page at a time, its parameters, inputs and commands.
+// What a board does, and, on one page at a time, its parameters, inputs and commands: the page of `takt live serve`, and, with a line of
+// its own to the port, that of the playground's folder.
 import { Chart, Colours, text } from "./chart.js";
+import { open } from "./line.js";
 import { initial, isNumber, node, save, short } from "./parts.js";
 
 const el = (id) => document.getElementById(id);
@@ -18,7 +20,7 @@ const SAMPLES = 512;
 /** Steps of a slider of real numbers. */
 const STEPS = 400;
 
-let socket, hello, state, link = { connected: false }, role = { writer: false, free: false, pages: 0 };
+let line, hello, state, link = { connected: false }, role = { writer: false, free: false, pages: 0 };
 /** Rows of values by name; all of them in the order of the messages. */
 let rows = new Map(), order = [];
 /** Answers that are awaited, by number. */
@@ -28,27 +30,28 @@ let number = 0, opened = 0;
 // ---- The line to the server -------------------------------------------------------------------------------------------------
 
 function connect() {
-  socket = new WebSocket(`ws://${location.host}${location.pathname}socket`);
-  socket.addEventListener("open", () => (opened = performance.now()));
-  socket.addEventListener("message", ({ data }) => {
-    const message = JSON.parse(data);
-    take[message.type]?.(message);
-  });
-  socket.addEventListener("close", () => {
-    for (const { reject } of asked.values()) reject(new Error("the connection to the server is lost"));
-    asked.clear();
-    link = { connected: false, text: "", gone: true };
-    showLink();
-    setTimeout(connect, RETRY);
+  line = open({
+    opened: () => (opened = performance.now()),
+    message(text) {
+      const message = JSON.parse(text);
+      take[message.type]?.(message);
+    },
+    closed() {
+      for (const { reject } of asked.values()) reject(new Error("the connection to the server is lost"));
+      asked.clear();
+      link = { connected: false, text: "", gone: true };
+      showLink();
+      setTimeout(connect, RETRY);
+    },
   });
 }
 
 /** Asks the server for something; an error is its answer. */
 function ask(wish) {
   return new Promise((resolve, reject) => {
-    if (socket.readyState !== WebSocket.OPEN) return reject(new Error("there is no connection to the server"));
+    if (!line.isOpen()) return reject(new Error("there is no connection to the server"));
     asked.set(++number, { resolve, reject });
-    socket.send(JSON.stringify({ id: number, ...wish }));
+    line.send(JSON.stringify({ id: number, ...wish }));
   });
 }
 

@@ -1,12 +1,14 @@
 // The page of `takt live serve` in a real browser, with a board simulated in Verilator: `cargo xtask web --test`.
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { constants, mkdtempSync, openSync, readFileSync, rmSync, writeFileSync, writeSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { createInterface } from "node:readline";
 import { after, afterEach, before, test } from "node:test";
+import { ReadStream } from "node:tty";
 import { chromium } from "playwright-core";
+import { serve as serveFiles } from "../serve.mjs";
 
 const TAKT = process.env.TAKT;
 /** Time limit in a browser, and for the circuit's compilation, on a busy machine; ms. */
@@ -241,6 +243,95 @@ test("a second page only shows, until control is free; stop makes outputs safe, 
   await second.click("#claim");
   await second.waitForFunction(() => document.getElementById("role").hidden && !document.getElementById("stop").disabled);
   assert.deepEqual([...errors, ...others], []);
+});
+
+/** Gives a page a port of Web Serial whose bytes go through this test to the simulated board: Chromium opens no pseudo-terminal. */
+async function withPort(page, path) {
+  const terminal = openSync(path, constants.O_RDWR | constants.O_NOCTTY), stream = new ReadStream(terminal);
+  stream.setRawMode(true);
+  await page.exposeFunction("toBoard", (bytes) => void writeSync(terminal, Uint8Array.from(bytes)));
+  await page.addInitScript(() => {
+    let from = null;
+    const port = {
+      getInfo: () => ({ usbVendorId: 0x403, usbProductId: 0x6015 }),
+      async open({ baudRate }) {
+        if (window.unplugged) throw new Error("there is no device");
+        port.baud = baudRate;
+        port.readable = new ReadableStream({ start: (controller) => void (from = controller) });
+        port.writable = new WritableStream({ write: (chunk) => window.toBoard([...chunk]) });
+      },
+      async close() {
+        from = null;
+      },
+    };
+    window.fromBoard = (bytes) => from?.enqueue(Uint8Array.from(bytes));
+    window.unplug = () => {
+      window.unplugged = true;
+      from.error(new Error("the device has been lost"));
+      from = null;
+    };
+    Object.defineProperty(navigator, "serial", { value: { requestPort: async () => port } });
+    window.port = port;
+  });
+  stream.on("data", (chunk) => page.evaluate((bytes) => window.fromBoard(bytes), [...chunk]).catch(() => {}));
+  return () => stream.destroy();
+}
+
+test("a page that opens the port itself sets parameters, records, and finds a board that was unplugged", limit, async () => {
+  await end(server);
+  const files = await serveFiles(process.env.TAKT_PAGE);
+  const context = await browser.newContext({ viewport: { width: 1600, height: 1000 } });
+  contexts.push(context);
+  const page = await context.newPage();
+  page.setDefaultTimeout(PATIENCE);
+  const errors = [];
+  page.on("pageerror", (error) => errors.push(error.message));
+  page.on("console", (message) => message.type() === "error" && errors.push(message.text()));
+  const close = await withPort(page, line[1]);
+  await page.goto(`${files.address}live/index.html`);
+  const chosen = (...names) => page.setInputFiles("#connect-files", names.map((name) => join(folder, name)));
+  // A mistake in the program is said in the form.
+  writeFileSync(join(folder, "wrong.s"), ".period\np: fadd y, x\n wait p\n");
+  await chosen("wrong.s");
+  await page.click("#connect-open");
+  await shown(page, "#connect-error", /^error[^]*wrong\.s:2/);
+  await shot(page, "live-serial-wrong");
+  await chosen("drive.s", "drive.toml");
+  await page.fill("#connect-machine", "t1");
+  await page.fill("#connect-baud", line[3]);
+  assert.equal(await page.inputValue("#connect-program"), "drive.s");
+  await shot(page, "live-serial-form");
+  await page.click("#connect-open");
+  await shown(page, "#runs", /^runs$/);
+  assert.match(await page.innerText("#what"), /^drive\.s on t1, USB 0403:6015 at 10,000,000 baud$/);
+  assert.equal(await page.evaluate(() => window.port.baud), 10_000_000);
+  const typed = row(page, "kp").locator(".field");
+  await typed.fill("1.5");
+  await typed.press("Enter");
+  await field(page, "kp", "1.5");
+  await typed.fill("7");
+  await typed.press("Enter");
+  await shown(page, '[data-name="kp"] .refusal', /^7 is no value of the parameter `kp`/);
+  await typed.press("Escape");
+  await page.fill("#channels input", "speed");
+  await page.keyboard.press("Enter");
+  await page.fill("#samples", "50");
+  await page.click("#single");
+  await shown(page, "#summary-line", /^50 samples of \d channels/);
+  await shot(page, "live-serial");
+  await page.evaluate(() => window.unplug());
+  await shown(page, "#link", /the port was unplugged, or closed/);
+  await page.evaluate(() => (window.unplugged = false));
+  await page.waitForFunction(() => document.getElementById("link").hidden);
+  await page.click("#stop");
+  await shown(page, "#reasons", /The outputs are safe: it is stopped/);
+  await page.click("[data-control=start]");
+  await shown(page, "#drives", /^outputs drive$/);
+  assert.deepEqual(errors, []);
+  await page.close();
+  close();
+  files.server.close();
+  ({ child: server, address } = await serve());
 });
 
 test("a board that goes away is said, and nothing can be set", limit, async () => {
