@@ -8,6 +8,7 @@ mod bound;
 mod boxes;
 mod dependence;
 mod enclosures;
+mod lost;
 mod parameters;
 mod refined;
 mod shipped;

@@ -1018,6 +1018,9 @@ fn accuracy_shows_literals_by_their_values() {
     assert_eq!(done.status, Some(1));
     assert!(done.stdout.contains("6:8-22: the divisor may be zero: 0.3, "), "{}", done.stdout);
     assert!(!done.stdout.contains("x14"), "{}", done.stdout);
+    // The output's row says which condition is missing.
+    let row = done.stdout.lines().find(|line| line.starts_with("  y ")).expect("the row of y");
+    assert!(row.contains(" needs ") && row.ends_with(" other than 0 at literal.s:6:8-22"), "{row}");
     let condition =
         "\nconditions that exclude these\n  `max(x, least)` keeps a divisor from zero; `.assume x >= least`";
     assert!(done.stdout.contains(condition), "{}", done.stdout);
@@ -1093,16 +1096,55 @@ fn accuracy_puts_bounds_beside_what_it_measures() {
             "{name}: {row:?}"
         );
     }
-    assert!(
-        done.stdout.contains("root.s:6:8-31: a root, which is infinitely steep at zero"),
-        "{}",
-        done.stdout
-    );
+    for text in [
+        "where bounds are lost",
+        "warning[lost-bound]: the bound of `y` is ",
+        "root.s:6:8",
+        "^ fsqrt: error up to ",
+        "a root is infinitely steep at zero; the operand is never below 0.2 in this run: `max(x, 0.2)`",
+    ] {
+        assert!(done.stdout.contains(text), "{text}: {}", done.stdout);
+    }
     let json: serde_json::Value =
         serde_json::from_str(&folder.line("accuracy root.s --inputs in.csv --bound --json").stdout).unwrap();
     assert_eq!((&json["bounds"][1]["name"], &json["each_period"]), (&"z".into(), &true.into()));
+    let lost = &json["lost"];
+    assert_eq!((lost.as_array().map(Vec::len), &lost[0]["places"][0]["line"]), (Some(1), &6.into()));
+    assert_eq!((&lost[0]["places"][0]["column"], &lost[0]["code"]), (&8.into(), &"lost-bound".into()));
+    assert!(lost[0]["help"].as_str().is_some_and(|help| help.contains("max(x, 0.2)")), "{lost}");
     let done = folder.line("accuracy root.s --bound");
     assert!(done.stderr.contains("--inputs"), "{}", done.stderr);
+
+    // An output without a bound: the divisor's values in the run, of either sign. An image has no source to point into.
+    for (rows, help) in [
+        (
+            "0.5\n0.7\n",
+            "`d` is never below 0.2 in this run: `max(d, 0.2)` keeps it there, or `.assume d >= 0.2`",
+        ),
+        (
+            "-0.5\n-0.7\n",
+            "`d` is never above -0.7 in this run: `min(d, -0.7)` keeps it there, or `.assume d <= -0.7`",
+        ),
+    ] {
+        folder.write(
+            "open.s",
+            ".ports latched\n.input x\n.output y\n.reg d\n.range x = -1, 1\n.period\np: d = x - 0.25\n y = 1/d\n wait p\n",
+        );
+        folder.write("in.csv", format!("x\n{rows}"));
+        let done = folder.line("accuracy open.s --inputs in.csv --bound");
+        assert_eq!(done.status, Some(0), "{}", done.stderr);
+        for text in [
+            "warning[lost-bound]: no bound for `y`: the divisor may be zero",
+            "open.s:8:",
+            "no bound out",
+            help,
+        ] {
+            assert!(done.stdout.contains(text), "{text}: {}", done.stdout);
+        }
+        folder.line("asm open.s -o open.elf");
+        let done = folder.line("accuracy open.elf --inputs in.csv --bound");
+        assert!(done.stdout.contains("open.s:8") && done.stdout.contains(help), "{}", done.stdout);
+    }
 }
 
 #[test]

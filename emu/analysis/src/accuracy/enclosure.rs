@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Statements of [`enclose()`](super::enclose()) about a program, as plain data.
 
+use super::extent::OperationExtent;
 use super::interval::Interval;
 use super::{Problem, ulp};
+use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::program::{ArrayRange, Assumption, Range};
 use takt_isa::{Program, Register, Type};
 
@@ -33,6 +35,8 @@ pub struct OutputBound {
     pub parts: Vec<(u32, f64)>,
     /// Hazards that leave the range open, by the word of their operation.
     pub open: Vec<u32>,
+    /// Words of the operations that compute the value, on all paths.
+    pub from: BTreeSet<u32>,
 }
 
 impl OutputBound {
@@ -144,6 +148,8 @@ pub struct Enclosure {
     pub converging: Vec<Converging>,
     /// Assumptions of the source that narrow a value, in the order of the code. The bounds hold for periods that keep them.
     pub relied: Vec<Relied>,
+    /// Ranges and errors at the operations of binary32, by word.
+    pub extents: BTreeMap<u32, OperationExtent>,
     /// Operations executed abstractly, iterations of loops included.
     pub operations: u64,
 }

@@ -16,8 +16,10 @@ mod compute;
 mod converge;
 mod enclose;
 mod enclosure;
+mod extent;
 mod interval;
 mod loops;
+mod loss;
 mod memory;
 mod node;
 mod number;
@@ -40,10 +42,12 @@ pub use enclose::{MAX_BUNDLES, MAX_UNROLLED, Reals, certify, enclose, enclose_re
 pub use enclosure::{
     Converging, Enclosure, Hazard, Moment, OutputBound, OutputPlace, Relied, StateRange, UnprovedRange,
 };
+pub use extent::{Extent, OperandExtent, OperationExtent};
 pub use interval::Interval;
+pub use loss::{Loss, loss};
 pub use number::Problem;
 pub use shadow::{
-    Decision, ErrorShare, LargestError, LostComparison, OperationAccuracy, OutputAccuracy, Shadow,
+    Decision, ErrorShare, LargestError, LostComparison, OperationAccuracy, OutputAccuracy, Seen, Shadow,
 };
 
 /// Rounding constants: programs add them to round to integers, since binary32 has no fraction bits at that magnitude.

@@ -10,6 +10,8 @@ use takt_isa::{Instruction, Type};
 
 /// Limit on the length of a value's history, in dependent operations; a value beyond it has no history.
 const MAX_DEPTH: u32 = 200;
+/// Limit on the operations that are known to have computed a value, each on a path of its own.
+const MAX_FROM: usize = 8;
 
 /// Value of a register or data word, with its history.
 #[derive(Debug)]
@@ -22,6 +24,8 @@ pub(super) struct Node {
     depth: u32,
     /// Computed as an integer from a float's bits, as functions do that take floats apart.
     is_of_bits: bool,
+    /// Words of the operations that computed the value, on all paths that lead here, as far as they are known.
+    from: Vec<u32>,
 }
 
 /// Operation with its operands.
@@ -35,11 +39,16 @@ pub(super) struct Made {
 impl Node {
     /// Value without history.
     pub(super) fn leaf(value: Value) -> Rc<Node> {
-        Node::leaf_of(value, false)
+        Node::leaf_of(value, false, Vec::new())
     }
 
-    fn leaf_of(value: Value, is_of_bits: bool) -> Rc<Node> {
-        Rc::new(Node { value, made: None, origin: None, depth: 0, is_of_bits })
+    fn leaf_of(value: Value, is_of_bits: bool, from: Vec<u32>) -> Rc<Node> {
+        Rc::new(Node { value, made: None, origin: None, depth: 0, is_of_bits, from })
+    }
+
+    /// Words of the operations that computed the value, as far as they are known.
+    pub(super) fn from(&self) -> &[u32] {
+        &self.from
     }
 
     /// Computed as an integer from a float's bits.
@@ -57,15 +66,17 @@ impl Node {
         let known = matches!(&value, Value::Patterns(patterns) if patterns.len() == 1);
         let is_of_bits = made.is_of_bits();
         if depth > MAX_DEPTH || known {
-            return Node::leaf_of(value, is_of_bits);
+            return Node::leaf_of(value, is_of_bits, vec![made.word]);
         }
-        Rc::new(Node { value, made: Some(made), origin: None, depth, is_of_bits })
+        let from = vec![made.word];
+        Rc::new(Node { value, made: Some(made), origin: None, depth, is_of_bits, from })
     }
 
     /// Node that replaces `self` under a condition.
     pub(super) fn narrowed(self: &Rc<Node>, value: Value, made: Option<Made>) -> Rc<Node> {
         let origin = Some(Rc::clone(self));
-        Rc::new(Node { value, made, origin, depth: self.depth, is_of_bits: self.is_of_bits })
+        let (depth, is_of_bits, from) = (self.depth, self.is_of_bits, self.from.clone());
+        Rc::new(Node { value, made, origin, depth, is_of_bits, from })
     }
 
     /// The node is this one, or narrows it under conditions: it stands for the same value.
@@ -97,7 +108,11 @@ impl Node {
         let (ours, theirs) = (origins(self), origins(other));
         let common = ours.iter().find(|node| theirs.iter().any(|other| Rc::ptr_eq(node, other)));
         let is_of_bits = self.is_of_bits && other.is_of_bits;
-        common.map_or_else(|| Node::leaf_of(self.value.join(&other.value), is_of_bits), Rc::clone)
+        let from = || {
+            let new = other.from.iter().filter(|word| !self.from.contains(word));
+            self.from.iter().chain(new).copied().take(MAX_FROM).collect()
+        };
+        common.map_or_else(|| Node::leaf_of(self.value.join(&other.value), is_of_bits, from()), Rc::clone)
     }
 }
 

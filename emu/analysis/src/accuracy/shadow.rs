@@ -2,6 +2,7 @@
 //! Shadow execution: binary64 alongside the bit-exact run, with the rounding error of each operation propagated to first order.
 
 use super::enclosure::OutputPlace;
+use super::interval::Interval;
 use super::probe::Probe;
 use super::{LARGEST_ROUNDED, ROUNDERS, fixed, is_rounder, ulp};
 use std::cmp::Ordering;
@@ -68,6 +69,29 @@ pub struct OperationAccuracy {
     pub cancelled_in: u64,
     /// Absorptions: executions in which a nonzero term of its sum was too small to change the result.
     pub absorbed: u64,
+    /// Results.
+    pub result: Seen,
+    /// Values of the operands, in the order of the instruction's.
+    pub reads: [Seen; 3],
+}
+
+/// Values of a run at a place in the program.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Range of the values; `None` if none was a finite number.
+    pub range: Option<Interval>,
+    /// Largest magnitude of their errors.
+    pub error: f64,
+}
+
+impl Seen {
+    fn add(&mut self, value: f64, exact: f64) {
+        if value.is_finite() {
+            let at = Interval::point(value);
+            self.range = Some(self.range.map_or(at, |range| range.hull(at)));
+            self.error = self.error.max((value - exact).abs());
+        }
+    }
 }
 
 /// Decision of the run that binary64 would have made differently.
@@ -118,6 +142,9 @@ pub struct Shadow {
     period: u64,
     /// Values count as exact at the start of each period.
     afresh: bool,
+    /// Periods that break an assumption of the source are left out; this one does.
+    keeping: bool,
+    broken: bool,
 }
 
 /// Result of an operation.
@@ -188,6 +215,8 @@ impl Shadow {
             lost: BTreeMap::new(),
             period: 0,
             afresh: false,
+            keeping: false,
+            broken: false,
         }
     }
 
@@ -195,6 +224,12 @@ impl Shadow {
     #[must_use]
     pub fn each_period_afresh(self) -> Shadow {
         Shadow { afresh: true, ..self }
+    }
+
+    /// Leaves out periods in which a value breaks an `.assume` of the source, in the run or in binary64, as static bounds do.
+    #[must_use]
+    pub fn keeping_assumptions(self) -> Shadow {
+        Shadow { keeping: true, ..self }
     }
 
     /// Runs the machine to the next `wait` or `halt` and follows it. If the machine waits and no tick is scheduled, the tick
@@ -252,6 +287,7 @@ impl Shadow {
     /// Begins a period: counts it, and drops the shadows if each period begins afresh.
     pub fn begin_period(&mut self) {
         self.period += 1;
+        self.broken = false;
         if self.afresh {
             self.registers.clear();
             self.memory.clear();
@@ -268,6 +304,11 @@ impl Shadow {
         for ((number, slot), instruction) in machine.numbered_slots().zip(&instructions) {
             let word = (address.index() * machine.slots.len() + number.index()) as u32;
             let outcome = self.execute(emulator, instruction, word);
+            if let (Some(outcome), Some(assumption)) = (&outcome, program.assumption(word)) {
+                let (low, high) = assumption.ends();
+                let real = outcome.shadow.as_ref().map_or(low, |(real, _)| *real);
+                self.broken |= !assumption.holds(outcome.bits) || real < low || real > high;
+            }
             if let Some(register) = instruction.writes(slot) {
                 written.push((register, outcome.unwrap_or(Outcome::exact(0))));
             }
@@ -340,6 +381,9 @@ impl Shadow {
         let local = if bound == 0.0 { 0.0 } else { value - plain.value };
         let operation = self.operations.entry(word).or_default();
         operation.count += 1;
+        for (seen, operand) in operation.reads.iter_mut().zip(operands) {
+            seen.add(operand.value, operand.value - operand.error());
+        }
         if let Some(terms) = plain.sum {
             let rounder = instruction.reads().iter().any(|register| self.rounders.contains(register));
             if let Some(nearest) = rounds_to_integer(terms).filter(|_| rounder) {
@@ -348,11 +392,13 @@ impl Shadow {
                 if carries && shadow != Some(nearest) {
                     decide(&mut self.decisions, word, period);
                 }
+                operation.result.add(value, value);
                 return Outcome::exact(bits);
             }
             operation.sum(terms, plain.value, value, carries, period);
         }
         if !carries && local == 0.0 {
+            operation.result.add(value, value);
             return Outcome::exact(bits);
         }
         operation.rounding = operation.rounding.max((local / ulp(plain.value)).abs());
@@ -361,6 +407,7 @@ impl Shadow {
             lose(&mut self.lost, word, period, true);
             return Outcome::exact(bits);
         }
+        operation.result.add(value, exact);
         // Telescoping sum: replace the operands' values in the run by their values in binary64 one by one; each step is an operand's share.
         let mut parts: Vec<ErrorShare> = Vec::new();
         let mut before = plain.value;
@@ -394,6 +441,9 @@ impl Shadow {
 
     /// Compares the outputs at the end of a period.
     pub fn compare(&mut self, emulator: &Emulator) {
+        if self.keeping && self.broken {
+            return;
+        }
         let mut outputs = std::mem::take(&mut self.outputs);
         let program = Rc::clone(&self.program);
         for output in &mut outputs {

@@ -5,6 +5,7 @@ mod bound_report;
 mod certificate;
 mod comparison;
 mod lines;
+mod lost;
 mod measurement;
 
 use crate::run::application::Application;
@@ -203,7 +204,7 @@ fn measured(
             false => None,
         };
         let enclosure = enclosure.as_ref();
-        let comparison = enclosure.map(|enclosure| Comparison { program, shadow, enclosure });
+        let comparison = enclosure.map(|enclosure| Comparison { loaded, shadow, enclosure });
         if arguments.json {
             let mut value = measured.json();
             comparison.inspect(|comparison| comparison.add_to(&mut value));

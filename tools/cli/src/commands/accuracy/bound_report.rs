@@ -12,7 +12,7 @@ use takt_analysis::accuracy::{
     Converging, Enclosure, ErrorShare, Hazard, Interval, Moment, OutputBound, Problem, Relied, UnprovedRange,
 };
 use takt_isa::program::Location;
-use takt_isa::{Program, Register, Type};
+use takt_isa::{Instruction, Op, Program, Register, Type};
 
 /// Proved error bounds of a program, ready for output.
 pub(super) struct BoundReport<'a> {
@@ -31,6 +31,11 @@ pub(super) fn ulps_text(ulps: f64) -> String {
 
 fn interval(interval: Option<Interval>) -> String {
     interval.map_or_else(|| "anywhere".to_owned(), |Interval { low, high }| ends_text(low, high))
+}
+
+/// Range of an output; a dash where a condition is missing.
+fn shown_range(output: &OutputBound) -> String {
+    output.range.map_or_else(|| "-".to_owned(), |range| interval(Some(range)))
 }
 
 /// Condition that excludes a hazard, as a source states it.
@@ -64,6 +69,36 @@ impl BoundReport<'_> {
     /// Places of the hazards that leave an output's range open.
     pub(super) fn open(&self, output: &OutputBound) -> Vec<String> {
         output.open.iter().map(|word| self.program.word_text(*word as usize)).collect()
+    }
+
+    /// Conditions without which an output has no bound, each with its place.
+    pub(super) fn needed(&self, output: &OutputBound) -> Vec<String> {
+        let hazards = self.enclosure.hazards.iter();
+        let open =
+            hazards.filter(|hazard| output.open.contains(&hazard.word) && !hazard.problem.is_defined());
+        let needed = |hazard: &Hazard| {
+            format!("needs {} at {}", self.missing(hazard), self.program.word_text(hazard.word as usize))
+        };
+        open.map(needed).collect()
+    }
+
+    /// Condition that a hazard's operation lacks.
+    fn missing(&self, hazard: &Hazard) -> String {
+        let names: Vec<String> = self.operands(hazard).into_iter().map(|(name, _)| name).collect();
+        let name = |names: Option<&String>| names.cloned().unwrap_or_else(|| "the operand".to_owned());
+        let (first, last) = (name(names.first()), name(names.last()));
+        let code = self.program.code.get(hazard.word as usize);
+        let op = code.and_then(|word| Instruction::decode(*word).ok()).map(|instruction| instruction.op);
+        match (hazard.problem, op) {
+            (Problem::DivisionByZero, _) => format!("{last} other than 0"),
+            (Problem::Domain, Some(Op::fsqrt)) => format!("{first} >= 0"),
+            (Problem::Domain, Some(Op::facos)) => format!("{first} within [-1, 1]"),
+            (Problem::Domain, _) => format!("{first} where the function has a value"),
+            (Problem::Overflow, _) => format!("a limit of {}", names.join(" or ")),
+            (Problem::Bits, _) => format!("{first} as a number"),
+            (Problem::Unbounded, _) => format!("a limit of {first} in the loop"),
+            _ => format!("a finite {first}"),
+        }
     }
 
     fn operands(&self, hazard: &Hazard) -> Vec<(String, Option<Interval>)> {
@@ -157,7 +192,7 @@ impl BoundReport<'_> {
         writeln!(out, "one period on {machine}, all inputs and states in their ranges, the states exact")?;
         let outputs = &enclosure.outputs;
         let width = outputs.iter().map(|output| output.name.len()).max().unwrap_or(0).max(6);
-        let wide = outputs.iter().map(|output| interval(output.range).len()).max().unwrap_or(0).max(5);
+        let wide = outputs.iter().map(|output| shown_range(output).len()).max().unwrap_or(0).max(5);
         let ulps = |output: &OutputBound| output.ulps().map_or_else(|| "-".to_owned(), ulps_text);
         let ulp_width = outputs.iter().map(|output| ulps(output).len()).max().unwrap_or(0).max(3);
         writeln!(
@@ -174,13 +209,15 @@ impl BoundReport<'_> {
             let lines = lines.filter(|(_, _, share)| *share >= 0.005 || *share == 0.0);
             let lines =
                 lines.map(|(at, _, share)| format!("{} ({:.0} %)", line_text(program, *at), 100.0 * share));
-            let open = self.open(output);
+            let open = self.needed(output);
             let lines: Vec<String> = match open.first() {
-                Some(place) if open.len() > 1 => vec![format!("open by {place} and {} more", open.len() - 1)],
-                Some(place) => vec![format!("open by {place}")],
+                Some(first) if open.len() > 1 => {
+                    vec![format!("{first} and {} more conditions", open.len() - 1)]
+                }
+                Some(first) => vec![first.clone()],
                 None => lines.collect(),
             };
-            let range = interval(output.range);
+            let range = shown_range(output);
             writeln!(
                 out,
                 "  {:<width$}  {range:>wide$}  {error:>11}  {ulps:>ulp_width$}  {}",

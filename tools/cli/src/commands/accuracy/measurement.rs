@@ -102,7 +102,7 @@ impl<'a> MeasurementReport<'a> {
             })
         };
         let line = |(location, line): (Location, LineAccuracy)| {
-            let OperationAccuracy { count, rounding, cancelled, cancelled_in, absorbed } = line.accuracy;
+            let OperationAccuracy { count, rounding, cancelled, cancelled_in, absorbed, .. } = line.accuracy;
             json!({
                 "place": self.program.place_text(location),
                 "operations": count,
