@@ -91,9 +91,11 @@ period:
         fmul    K{i}1, M{10*min(i,1)+max(i,1)}, I11
         fmul    k{i}1, M{10*min(i,2)+max(i,2)}, I12
         fsub    K{i}1, K{i}1, k{i}1
+        .assume K{i}1 <= (i <= 2 ? 1 : 8) ; of a position M/(M + RX); of a speed at most √(P0/RX)/2
         fmul    K{i}2, M{10*min(i,2)+max(i,2)}, I22
         fmul    k{i}2, M{10*min(i,1)+max(i,1)}, I12
         fsub    K{i}2, K{i}2, k{i}2
+        .assume K{i}2 <= (i <= 2 ? 1 : 8)
         .endr
 
 ; ---- Correction: s = m + K·(z - H·m), P = M - K·H·M ------------------------------------------------------------------------------

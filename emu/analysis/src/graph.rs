@@ -54,7 +54,17 @@ pub(crate) struct Graph<'p> {
 }
 
 impl<'p> Graph<'p> {
+    /// Graph in which every loop has a bound.
     pub(crate) fn new(program: &'p Program) -> Result<Graph<'p>, BoundError> {
+        Graph::of(program, false)
+    }
+
+    /// Graph in which loops without a bound may have any number of iterations, stated as [`u32::MAX`].
+    pub(crate) fn with_open_loops(program: &'p Program) -> Result<Graph<'p>, BoundError> {
+        Graph::of(program, true)
+    }
+
+    fn of(program: &'p Program, open: bool) -> Result<Graph<'p>, BoundError> {
         let known = known_registers(program);
         let bundles = program.addresses().filter_map(|address| program.bundle(address));
         let node = |instructions: Vec<Instruction>| {
@@ -88,6 +98,12 @@ impl<'p> Graph<'p> {
                 (Some(count), _) => _ = bounds.insert(head, (*count, *count)),
                 (None, Some(_)) => {}
                 (None, None) => return Err(BoundError::new(program, head, Refusal::UnknownCount)),
+            }
+        }
+        if open {
+            let back = program.addresses().flat_map(|from| graph.successors(from)).filter(|edge| edge.back);
+            for edge in back {
+                bounds.entry(edge.to).or_insert((1, u32::MAX));
             }
         }
         for (head, (least, most)) in bounds {

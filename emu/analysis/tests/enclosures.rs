@@ -491,6 +491,8 @@ struct CheckCounts {
     outside: u64,
     /// Ranges of integer outputs compared with a value.
     integers: u64,
+    /// Operations whose values are compared.
+    extents: u64,
 }
 
 /// Run of a program, compared with its enclosure.
@@ -630,6 +632,20 @@ impl Run<'_> {
         kept
     }
 
+    /// Checks the ranges and errors at every operation.
+    fn operations(&self, shadow: &Shadow, checked: &mut CheckCounts) {
+        for (word, operation) in shadow.operations() {
+            let Some(bound) = self.enclosure.extents.get(word) else { continue };
+            let (Some(range), Some(error)) = (bound.result.range, bound.result.error) else { continue };
+            let Some(seen) = operation.result.range else { continue };
+            let most = error * (1.0 + 1e-6) + 1e-12 * range.magnitude() + 1e-44;
+            let within = range.low <= seen.low && seen.high <= range.high;
+            checked.extents += 1;
+            assert!(within, "word {word}: {seen:?} beyond {range:?}");
+            assert!(operation.result.error <= most, "word {word}: {:?} beyond {error}", operation.result);
+        }
+    }
+
     fn run(&self, periods: usize, random: &mut Random, checked: &mut CheckCounts) {
         let (program, machine) = (self.program, self.program.machine);
         let mut emulator = Emulator::new(program).unwrap();
@@ -687,6 +703,7 @@ impl Run<'_> {
                 return;
             }
         }
+        self.operations(&shadow, checked);
         for bound in self.enclosure.outputs.iter().filter(|bound| bound.ty == Type::F) {
             let measured = shadow.outputs().iter().find(|output| output.place == bound.place).unwrap();
             let (Some(error), Some(range), Some(worst)) = (bound.error, bound.range, measured.absolute)
@@ -723,6 +740,9 @@ fn check(seed: u64, checked: &mut CheckCounts) {
     compare(&program, MAX_UNROLLED, seed, &text, checked);
     if text.contains(".loop_bound") {
         compare(&program, 0, seed, &text, checked);
+        // Loops without a bound may have any number of iterations.
+        let open = Program { loop_bounds: Vec::new(), ..program };
+        compare(&open, MAX_UNROLLED, seed, &text, checked);
     }
 }
 
@@ -770,16 +790,18 @@ fn no_run_contradicts_an_enclosure() {
         wrapped,
         outside,
         integers,
+        extents,
         ..
     } = checked;
     println!(
         "figures: programs={programs} refused={refused} without_hazards={safe} bounds={bounds} tight={tight} states={states} \
-         raised={raised} wrapped={wrapped} outside={outside} integers={integers}"
+         raised={raised} wrapped={wrapped} outside={outside} integers={integers} \
+         extents={extents}"
     );
     // Weak statements would not test the analysis: require enough that are made and nearly reached.
     assert!(refused < programs / 4 && safe > programs / 8 && bounds > programs / 2, "too little is stated");
     assert!(
-        wrapped > programs / 8 && outside > programs / 100 && integers > programs,
+        wrapped > programs / 8 && outside > programs / 100 && integers > programs && extents > 10 * programs,
         "integers are not tried"
     );
     assert!(tight > programs / 20 && states > programs && raised > programs / 4, "nothing comes near");

@@ -299,7 +299,7 @@ impl Measured<'_> {
     /// Looks for a period in which an output errs most: from the worst of random ones, by steps of all sizes in one or two values.
     fn search(&mut self, place: OutputPlace, periods: u64) {
         let mut random = Random::new(55);
-        let (mut emulator, shadow) = (self.emulator(), Shadow::new(self.program).each_period_afresh());
+        let (mut emulator, shadow) = (self.emulator(), shadow(self.program));
         let Ok(true) = shadow.clone().run_period(&mut emulator) else { return };
         let begun = (&emulator, &shadow);
         let mut best = self.case(&mut random);
@@ -347,9 +347,13 @@ impl Measured<'_> {
     }
 }
 
+/// Shadow of periods that keep the assumptions of the source, each of which begins with exact values.
+fn shadow(program: &Program) -> Shadow {
+    Shadow::new(program).each_period_afresh().keeping_assumptions()
+}
+
 fn measured<'p>(program: &'p Program, path: Option<&str>, periods: u64) -> Measured<'p> {
-    let mut measured =
-        Measured { program, shadow: Shadow::new(program).each_period_afresh(), found: Vec::new() };
+    let mut measured = Measured { program, shadow: shadow(program), found: Vec::new() };
     measured.at_random(periods.clamp(LEAST, PERIODS));
     path.inspect(|path| measured.recorded(path));
     measured

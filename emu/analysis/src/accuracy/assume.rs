@@ -290,6 +290,21 @@ impl Context {
         self.narrow(node, to, View::Float)
     }
 
+    /// Assumes that a value lies in an interval in the run and exactly.
+    pub(super) fn promise(&mut self, node: &Rc<Node>, to: Interval, view: View) -> Followed {
+        self.narrow(node, to, view)?;
+        let Value::Float(number) = self.current(node) else { return Ok(()) };
+        let exact = Interval::new(number.exact.low.max(to.low), number.exact.high.min(to.high));
+        if exact.low > exact.high {
+            return Err(Impossible);
+        }
+        if exact != number.exact {
+            let value = Value::Float(Rc::new(Number { exact, ..Number::clone(number) }));
+            self.set(node, value);
+        }
+        Ok(())
+    }
+
     fn constrain(&mut self, form: Affine) {
         if form.range().high > 0.0 {
             self.constraints.push(form);

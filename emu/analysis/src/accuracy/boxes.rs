@@ -4,6 +4,7 @@
 
 use super::enclose::{Reals, enclose_reals};
 use super::enclosure::{Enclosure, OutputBound};
+use super::extent::join_extent;
 use super::interval::Interval;
 use super::refine::middle;
 use super::{kept, ulp};
@@ -12,11 +13,12 @@ use takt_isa::program::Range;
 use takt_isa::{Program, Type};
 
 /// Limit on the boxes that are enclosed for a program.
-const MAX_BOXES: u64 = 512;
+const MAX_BOXES: u64 = 4096;
 /// Limit on the operations of all boxes together.
 const MAX_OPERATIONS: u64 = 1 << 16;
-/// Divisions in a row that gain less than [`GAIN`] before no more are tried.
-const PATIENCE: u32 = 12;
+/// Divisions in a row that gain less than [`GAIN`] before no more are tried, or half as many as there are boxes: of boxes with like errors, only the
+/// division of the last one gains.
+const PATIENCE: usize = 12;
 /// Share of the largest error by which a division is worth it.
 const GAIN: f64 = 0.002;
 
@@ -69,7 +71,7 @@ pub fn enclose_in_boxes(program: &Program, reals: &Reals) -> Result<Enclosure, B
         parts.extend(best);
         let after = parts.iter().map(|part| part.size).fold(0.0, f64::max);
         idle = if after < before * (1.0 - GAIN) { 0 } else { idle + 1 };
-        if enclosed >= most || idle >= PATIENCE {
+        if enclosed >= most || idle >= PATIENCE.max(parts.len() / 2) {
             break;
         }
     }
@@ -157,12 +159,15 @@ fn joined(a: Enclosure, b: Enclosure) -> Enclosure {
         }
     }
     relied.sort_by_key(|relied| relied.assumption.word);
+    let mut extents = a.extents;
+    b.extents.into_iter().for_each(|(word, extent)| join_extent(&mut extents, word, extent));
     Enclosure {
         outputs,
         hazards,
         assumed: a.assumed.into_iter().chain(b.assumed).collect(),
         converging: Vec::new(),
         relied,
+        extents,
         operations: a.operations + b.operations,
     }
 }
@@ -173,6 +178,7 @@ fn both(a: OutputBound, b: OutputBound) -> OutputBound {
     let mut open = a.open.clone();
     open.extend(b.open.iter().filter(|word| !a.open.contains(word)));
     open.sort_unstable();
+    let from = a.from.union(&b.from).copied().collect();
     let worse = if b.error.is_none_or(|b| a.error.is_some_and(|a| b > a)) { b } else { a };
-    OutputBound { range, error, open, ..worse }
+    OutputBound { range, error, open, from, ..worse }
 }

@@ -10,6 +10,7 @@ use super::affine::Affine;
 use super::assume::View;
 use super::certificate::{self, Certificate};
 use super::enclosure::{Enclosure, Hazard, OutputBound, OutputPlace, Relied};
+use super::extent::{Extents, OperationExtent, join_extent};
 use super::interval::Interval;
 use super::memory::array_starts;
 use super::node::{Made, Node};
@@ -113,7 +114,7 @@ fn explored<'p>(
     reals: &Reals,
     plain: bool,
 ) -> Result<Explorer<'p>, BoundError> {
-    let graph = Graph::new(program)?;
+    let graph = Graph::with_open_loops(program)?;
     let mut explorer = Explorer {
         program,
         graph,
@@ -245,6 +246,10 @@ pub(super) struct Found {
     relied: BTreeMap<u32, Register>,
     /// Operations in the histories of outputs, if there are assumptions.
     histories: BTreeMap<Place, BTreeSet<u32>>,
+    /// Ranges and errors at each operation.
+    extents: Extents,
+    /// Operations that compute the values of outputs.
+    sources: BTreeMap<Place, BTreeSet<u32>>,
     pub(super) operations: u64,
 }
 
@@ -661,7 +666,7 @@ impl Explorer<'_> {
     ) -> bool {
         let (low, high) = assumption.ends();
         let (view, known) = match assumption.ty {
-            Type::F => (View::Float, node.value.float().ok().map(|number| number.actual)),
+            Type::F => (View::Float, node.value.float().ok().map(|number| number.both())),
             Type::I | Type::B => (View::Integer, Some(node.value.whole().actual)),
         };
         let promised = Interval::new(low, high);
@@ -672,7 +677,7 @@ impl Explorer<'_> {
             return true;
         }
         self.found.relied.insert(assumption.word, register);
-        let Some(mut scene) = self.scene(|context| context.narrow(node, promised, view)) else {
+        let Some(mut scene) = self.scene(|context| context.promise(node, promised, view)) else {
             return false;
         };
         for node in state.registers.values_mut().chain(state.memory.values_mut()) {
@@ -702,8 +707,12 @@ impl Explorer<'_> {
         self.found.operations += u64::from(instruction.effect() != Effect::Nothing);
         Ok(match instruction.effect() {
             Effect::Compute => {
-                let node = self.apply(&Made { word, instruction: *instruction, operands });
-                Some(constrained(node, &state.constraints))
+                let made = Made { word, instruction: *instruction, operands };
+                let node = constrained(self.apply(&made), &state.constraints);
+                if let Some(extent) = OperationExtent::of(&made, &node) {
+                    join_extent(&mut self.found.extents, word, extent);
+                }
+                Some(node)
             }
             Effect::Immediate => Some(Node::leaf(self.constant(instruction.constant))),
             Effect::Load => {
@@ -809,6 +818,7 @@ impl Explorer<'_> {
             let words = self.found.histories.entry(place).or_default();
             node.each_operation(&mut |made| _ = words.insert(made.word));
         }
+        self.found.sources.entry(place).or_default().extend(node.from());
         join_into(&mut self.found.outputs, place, &value);
         join_into(&mut self.found.computed, place, &node.value);
     }
@@ -845,6 +855,7 @@ impl Explorer<'_> {
             relied: self.relied(),
             converging,
             operations: self.found.operations,
+            extents: self.found.extents,
         }
     }
 
@@ -895,6 +906,7 @@ impl Explorer<'_> {
             error: number.map(|number| number.error_range().magnitude()),
             parts,
             open: if range.is_none() { self.open(place) } else { Vec::new() },
+            from: self.found.sources.get(&place).cloned().unwrap_or_default(),
             range,
         })
     }

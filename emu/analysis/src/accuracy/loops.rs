@@ -152,8 +152,8 @@ impl Shape {
 /// Search for an invariant of one loop.
 struct Search {
     entry: State,
-    /// Most iterations.
-    turns: u32,
+    /// Most iterations; `None` for any number.
+    turns: Option<u32>,
     /// Values of what the loop changes.
     shapes: BTreeMap<Place, Shape>,
     /// Operations that errors come from.
@@ -198,7 +198,7 @@ impl Explorer<'_> {
     pub(super) fn summary(&mut self, head: BundleAddress, entry: State) -> Result<Walk, BoundError> {
         let (floats, integers) = self.thresholds();
         let mut search = Search {
-            turns: self.graph.loops[&head].most,
+            turns: Some(self.graph.loops[&head].most).filter(|most| *most != u32::MAX),
             shapes: BTreeMap::new(),
             blamed: BTreeMap::new(),
             unbounded: BTreeSet::new(),
@@ -257,7 +257,7 @@ impl Explorer<'_> {
             back.iter().map(|state| word(self, state).unwrap_or_else(unknown)).collect();
         let first = Shape::of(&entry.value);
         let plain = ends.iter().fold(first.clone(), |all, end| all.join(&Shape::of(&end.value)));
-        let counted = counted(&entry.value, &head.value, &ends, search.turns);
+        let counted = search.turns.and_then(|turns| counted(&entry.value, &head.value, &ends, turns));
         (plain, counted)
     }
 
