@@ -36,6 +36,10 @@ const SEARCHED: u64 = 2_000_000;
 /// Outputs that the search takes, one after the other, always the loosest; and the factor from which it does.
 const ROUNDS: usize = 4;
 const LOOSE: f64 = 10.0;
+/// Cycles after which a period counts as endless: it waits for inputs that do not come.
+const ENDLESS: u64 = 1 << 20;
+/// Draws of inputs with which the first period may begin.
+const DRAWS: u32 = 16;
 /// Fewest periods of random runs.
 const LEAST: u64 = 8;
 /// Folders of the programs.
@@ -183,7 +187,8 @@ impl Measured<'_> {
     fn at_random(&mut self, periods: u64) {
         let mut emulator = self.emulator();
         let mut random = Random::new(54);
-        for period in 0..=periods {
+        let (mut period, mut drawn) = (0, 0);
+        while period <= periods {
             let inputs: Vec<(Register, u32)> = self
                 .ranges(true)
                 .map(|range| (range.register, draw(range.ty, range.ends(), &mut random)))
@@ -201,10 +206,20 @@ impl Measured<'_> {
                     }
                 }
             }
-            if !self.shadow.run_period(&mut emulator).unwrap_or(false) {
+            if self.period(&mut emulator) {
+                period += 1;
+            } else if period == 0 && drawn < DRAWS {
+                (emulator, drawn) = (self.emulator(), drawn + 1);
+            } else {
                 return;
             }
         }
+    }
+
+    /// Runs a period. Returns false if it is the last: it halts, faults, or does not end.
+    fn period(&mut self, emulator: &mut Emulator) -> bool {
+        emulator.set_cycle_limit(emulator.now() + ENDLESS);
+        self.shadow.run_period(emulator).unwrap_or(false)
     }
 
     /// A run with the recorded inputs beside the program, if any: rows within the ranges, to the first period that leaves a state's.
@@ -235,7 +250,7 @@ impl Measured<'_> {
                 emulator.set_input_bits(register, bits).expect("an input");
             }
             for _ in 0..if std::mem::replace(&mut begun, true) { 1 } else { 2 } {
-                if !self.shadow.run_period(&mut emulator).unwrap_or(false) {
+                if !self.period(&mut emulator) {
                     return;
                 }
             }
@@ -282,6 +297,7 @@ impl Measured<'_> {
     /// Error of an output at the end of a period that begins so, after `.once` as `begun` holds it.
     fn error(&self, begun: (&Emulator, &Shadow), case: &Case, place: OutputPlace) -> Option<f64> {
         let (mut emulator, mut shadow) = (begun.0.clone(), begun.1.clone());
+        emulator.set_cycle_limit(emulator.now() + ENDLESS);
         for Drawn { cell, bits, .. } in &case.0 {
             match *cell {
                 Cell::Input(register) => emulator.set_input_bits(register, *bits).ok()?,
@@ -300,6 +316,7 @@ impl Measured<'_> {
     fn search(&mut self, place: OutputPlace, periods: u64) {
         let mut random = Random::new(55);
         let (mut emulator, shadow) = (self.emulator(), shadow(self.program));
+        emulator.set_cycle_limit(emulator.now() + ENDLESS);
         let Ok(true) = shadow.clone().run_period(&mut emulator) else { return };
         let begun = (&emulator, &shadow);
         let mut best = self.case(&mut random);

@@ -13,12 +13,11 @@ use takt_isa::program::Range;
 use takt_isa::{Program, Type};
 
 /// Limit on the boxes that are enclosed for a program.
-const MAX_BOXES: u64 = 4096;
+const MAX_BOXES: u64 = 512;
 /// Limit on the operations of all boxes together.
 const MAX_OPERATIONS: u64 = 1 << 16;
-/// Divisions in a row that gain less than [`GAIN`] before no more are tried, or half as many as there are boxes: of boxes with like errors, only the
-/// division of the last one gains.
-const PATIENCE: usize = 12;
+/// Divisions in a row that gain less than [`GAIN`] before no more are tried.
+const PATIENCE: u32 = 12;
 /// Share of the largest error by which a division is worth it.
 const GAIN: f64 = 0.002;
 
@@ -71,7 +70,7 @@ pub fn enclose_in_boxes(program: &Program, reals: &Reals) -> Result<Enclosure, B
         parts.extend(best);
         let after = parts.iter().map(|part| part.size).fold(0.0, f64::max);
         idle = if after < before * (1.0 - GAIN) { 0 } else { idle + 1 };
-        if enclosed >= most || idle >= PATIENCE.max(parts.len() / 2) {
+        if enclosed >= most || idle >= PATIENCE {
             break;
         }
     }
