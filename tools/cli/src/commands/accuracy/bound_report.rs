@@ -212,7 +212,7 @@ impl BoundReport<'_> {
             let open = self.needed(output);
             let lines: Vec<String> = match open.first() {
                 Some(first) if open.len() > 1 => {
-                    vec![format!("{first} and {} more conditions", open.len() - 1)]
+                    vec![format!("{first} and {} more", open.len() - 1)]
                 }
                 Some(first) => vec![first.clone()],
                 None => lines.collect(),
