@@ -10,9 +10,6 @@ use takt_diagnostics::diag::Diagnostics;
 use takt_isa::{Machine, Program};
 use takt_system::{ProgramError, ReadError, Request};
 
-/// Most bytes of the files together.
-pub(crate) const BYTES: usize = 16 << 20;
-
 /// Chosen files, by name.
 pub(crate) struct Files(pub(crate) BTreeMap<String, Vec<u8>>);
 

@@ -11,7 +11,7 @@
     reason = "an exported name is an unsafe attribute, and seen from outside the crate only; an import is a foreign function"
 )]
 
-use crate::application::{BYTES, Files};
+use crate::application::Files;
 use crate::session::{Pages, Session, Target};
 use anyhow::{Context, Result, anyhow, ensure};
 use serde::Deserialize;
@@ -45,6 +45,8 @@ mod page {
 const SILENT: u32 = 5;
 /// Most bytes that one read takes.
 const READ: usize = 4096;
+/// Most bytes of the files together.
+const BYTES: usize = 16 << 20;
 /// Number of the only page.
 const PAGE: u64 = 0;
 
