@@ -10,3 +10,4 @@
 .const  LEAST = -125000
 .const  GREATEST = 125000
 .include "drive.s"
+; SPDX-License-Identifier: MIT OR Apache-2.0

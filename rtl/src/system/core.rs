@@ -2,7 +2,7 @@
 //! Generator of a system's core: the core with its gate, and a decoder for writes to its output ports.
 
 use super::SystemPlan;
-use super::plan::{Driver, OutputPort, STATUS};
+use super::plan::{Driver, OutputPort, core_outputs};
 use crate::plan::Plan;
 use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Port, choose, concat, decimal};
@@ -116,7 +116,7 @@ fn ports(plan: &SystemPlan, core: usize, outputs: &[OutputPort]) -> Vec<Port> {
             ports.push(output(Net::named(format!("{}_value", port_name(&port.name))).wide(32)));
         }
     }
-    for (i, status) in STATUS.into_iter().enumerate() {
+    for (i, status) in core_outputs().enumerate() {
         let port = output(status);
         ports.push(if i == 0 { port.heading("As the core has them (docs/hardware.md).") } else { port });
     }
@@ -242,7 +242,7 @@ fn write_core(
             .same(bus)
             .port("read_output", read)
             .same([net::TICK])
-            .same(STATUS)
+            .same(core_outputs())
             .same(seen)
             .open(open.iter().map(Net::name)),
     );

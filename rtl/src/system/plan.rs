@@ -11,10 +11,11 @@ use takt_isa::timing::Cycle;
 /// A base tick is due.
 pub(super) const DUE: Net = Net::bit("due");
 
-/// Status outputs that a core's module passes on from its core.
-pub(super) const STATUS: [Net; 9] = [
-    net::ENDED,
-    net::PUBLISHED,
+/// Outputs that say when a core's outputs are its period's: a board takes them, and some links.
+pub(super) const PUBLISHING: [Net; 2] = [net::ENDED, net::PUBLISHED];
+
+/// Status outputs of a core, for which every top has pins.
+pub(super) const STATUS: [Net; 7] = [
     net::WAITING,
     net::HALTED,
     net::DEADLINE_MISSED,
@@ -23,6 +24,11 @@ pub(super) const STATUS: [Net; 9] = [
     net::FAULT_SLOT,
     net::FAULT_ADDRESS,
 ];
+
+/// Outputs that a core's module passes on from its core.
+pub(super) fn core_outputs() -> impl Iterator<Item = Net> {
+    PUBLISHING.into_iter().chain(STATUS)
+}
 
 /// Driver of a system's cores, which loads them and sends their ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -240,10 +246,12 @@ impl SystemPlan {
 
     /// Status pins of the top: `due`, then the status of all cores, core 0 lowest.
     pub fn status_pins(&self) -> Vec<Net> {
-        let cores = self.cores.len() as u32;
-        let told =
-            STATUS.into_iter().skip(2).map(|net| Net::named(net.name().to_owned()).wide(net.width() * cores));
-        [DUE].into_iter().chain(told).collect()
+        [DUE].into_iter().chain(STATUS.map(|status| self.over_cores(&status))).collect()
+    }
+
+    /// Pin with a status output of all cores, core 0 lowest.
+    pub(super) fn over_cores(&self, status: &Net) -> Net {
+        Net::named(status.name().to_owned()).wide(status.width() * self.cores.len() as u32)
     }
 
     /// Name of a core's port in a top that a board drives.

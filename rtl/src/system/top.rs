@@ -3,7 +3,7 @@
 
 use super::core::{LOAD_INPUT, arrives, port_name, values, watched};
 use super::image::Record;
-use super::plan::{DUE, Driver, STATUS};
+use super::plan::{DUE, Driver, PUBLISHING, STATUS, core_outputs};
 use super::{SystemPlan, links};
 use crate::export::RESET_CYCLES;
 use crate::plan::names::net;
@@ -30,7 +30,7 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
     }
     m.banner("status of the cores");
     for core in 0..plan.cores.len() {
-        for status in STATUS.into_iter().filter(|status| uses_output(plan, core, status)) {
+        for status in used(plan, core) {
             m.wires([of(plan, core, &status)]);
         }
         for port in plan.outputs(core) {
@@ -57,32 +57,24 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
     if plan.driver == Driver::Itself {
         m.assign(RUNNING, !RESET);
     }
-    for (status, pin) in status_outputs(plan) {
+    for status in passed_on(plan) {
         let each = (0..plan.cores.len()).map(|core| of(plan, core, &status).into());
-        m.assign(pin, concat(each.collect::<Vec<Expr>>()));
+        m.assign(plan.over_cores(&status), concat(each.collect::<Vec<Expr>>()));
     }
     m.finish()
 }
 
-/// The top uses this output of a core. `ended` serves a board, `published` also some links.
-fn uses_output(plan: &SystemPlan, core: usize, status: &Net) -> bool {
-    let for_links = *status != net::ENDED && (*status != net::PUBLISHED || plan.sends_published(core));
-    for_links || plan.driver == Driver::Board
+/// Outputs of a core that the top uses.
+fn used(plan: &SystemPlan, core: usize) -> impl Iterator<Item = Net> {
+    let (board, sends) = (plan.driver == Driver::Board, plan.sends_published(core));
+    let publishing = PUBLISHING.into_iter().filter(move |net| board || (*net == net::PUBLISHED && sends));
+    publishing.chain(STATUS)
 }
 
-/// Status outputs of the cores, each with the pin of the top that concatenates it over all cores, core 0 lowest.
-fn status_outputs(plan: &SystemPlan) -> Vec<(Net, Net)> {
-    let for_board = [net::ENDED, net::PUBLISHED];
-    let (pins, shown) = match plan.driver {
-        Driver::Itself => (Vec::new(), for_board.len()),
-        Driver::Board => {
-            let wide =
-                for_board.map(|status| Net::named(status.name().to_owned()).wide(plan.cores.len() as u32));
-            (wide.to_vec(), 0)
-        }
-    };
-    let pins = pins.into_iter().chain(plan.status_pins().into_iter().skip(1));
-    STATUS.into_iter().skip(shown).zip(pins).collect()
+/// Status outputs of the cores that the top has pins for, each concatenated over all cores.
+fn passed_on(plan: &SystemPlan) -> impl Iterator<Item = Net> {
+    let publishing = PUBLISHING.into_iter().filter(|_| plan.driver == Driver::Board);
+    publishing.chain(STATUS)
 }
 
 /// Net of a core's status output.
@@ -173,8 +165,8 @@ fn ports(plan: &SystemPlan) -> Vec<Port> {
         });
         last = Some(pin.link);
     }
-    for (i, (_, pin)) in status_outputs(plan).into_iter().enumerate() {
-        let port = Port::new(Direction::Output, pin);
+    for (i, status) in passed_on(plan).enumerate() {
+        let port = Port::new(Direction::Output, plan.over_cores(&status));
         ports.push(if i == 0 {
             port.heading(
                 "Status of each core, core 0 lowest (docs/hardware.md). A fault stops the ticks of all cores.",
@@ -356,8 +348,9 @@ fn instance(plan: &SystemPlan, m: &mut Module, core: usize) {
             instance = instance.port(format!("{name}_value"), value);
         }
     }
-    for status in STATUS {
-        instance = match uses_output(plan, core, &status) {
+    let used: Vec<Net> = used(plan, core).collect();
+    for status in core_outputs() {
+        instance = match used.contains(&status) {
             true => instance.port(status.name(), of(plan, core, &status)),
             false => instance.open([status.name()]),
         };

@@ -3,9 +3,9 @@
 
 use anyhow::{Context, Result, anyhow, bail};
 use std::collections::BTreeMap;
-use takt_asm::names::{DebugInfo, NamedArray};
+use takt_asm::names::DebugInfo;
 use takt_asm::{MemoryLoader, Options, Search, image};
-use takt_board::{Application, Array, Board, Mistake, Wiring};
+use takt_board::{Application, Board, Mistake, Wiring};
 use takt_diagnostics::diag::Diagnostics;
 use takt_isa::{Machine, Program};
 use takt_system::{ProgramError, ReadError, Request};
@@ -32,16 +32,19 @@ fn right<T>(result: Result<T, Vec<Mistake>>) -> Result<T> {
 }
 
 impl Files {
+    fn bytes(&self, name: &str) -> Result<&[u8]> {
+        let bytes = self.0.get(name).map(Vec::as_slice);
+        bytes.with_context(|| format!("the file {name} is not among the chosen ones"))
+    }
+
     fn text(&self, name: &str) -> Result<&str> {
-        let bytes =
-            self.0.get(name).with_context(|| format!("the file {name} is not among the chosen ones"))?;
+        let bytes = self.bytes(name)?;
         std::str::from_utf8(bytes).map_err(|_| anyhow!("{name} is not text"))
     }
 
     /// A program, from an image or from sources, which are assembled for a machine unless they name theirs.
     fn program(&self, name: &str, machine: &'static Machine) -> Result<(Program, DebugInfo)> {
-        let bytes =
-            self.0.get(name).with_context(|| format!("the file {name} is not among the chosen ones"))?;
+        let bytes = self.bytes(name)?;
         if image::is_image(bytes) {
             let (program, debug) =
                 image::read_with(bytes).with_context(|| format!("{name} is not an image that can run"))?;
@@ -81,11 +84,10 @@ impl Files {
             about.push(debug);
             Application::from(&program).into_owned()
         };
-        let array = |NamedArray { name, base, sizes, ty }: NamedArray| Array { name, base, sizes, ty };
         let (mut sources, mut arrays) = (Vec::new(), Vec::new());
         for DebugInfo { sources: texts, names, .. } in about {
             sources.push(texts);
-            arrays.push(names.arrays.into_iter().map(array).collect());
+            arrays.push(crate::arrays(&names));
         }
         Ok(Loaded { application: application.with_arrays(arrays), sources })
     }

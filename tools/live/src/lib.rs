@@ -21,3 +21,12 @@ pub mod value;
 
 pub use control::{Control, set, setting};
 pub use session::{EVERY, Pages, Session, Target};
+
+use takt_asm::names::{NamedArray, Names};
+use takt_board::Array;
+
+/// A program's arrays, as an [`Application`](takt_board::Application) has them.
+pub fn arrays(names: &Names) -> Vec<Array> {
+    let array = |NamedArray { name, base, sizes, ty }: NamedArray| Array { name, base, sizes, ty };
+    names.arrays.iter().cloned().map(array).collect()
+}

@@ -290,7 +290,7 @@ impl Context {
         self.narrow(node, to, View::Float)
     }
 
-    /// Assumes that a value lies in an interval in the run and exactly.
+    /// Narrows a value to an interval, both in the run and exactly.
     pub(super) fn promise(&mut self, node: &Rc<Node>, to: Interval, view: View) -> Followed {
         self.narrow(node, to, view)?;
         let Value::Float(number) = self.current(node) else { return Ok(()) };

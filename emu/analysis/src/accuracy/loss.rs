@@ -21,7 +21,7 @@ pub struct Loss<'e> {
     pub bound: &'e OperationExtent,
     /// The same as the run shows them.
     pub seen: OperationAccuracy,
-    /// Factor between bound and run of the result, and the part of it that arises here; infinite if a problem leaves the result open.
+    /// Factor between bound and run of the result; infinite if a problem leaves the result open.
     pub factor: f64,
     /// Part of the factor that arises at this operation.
     pub gain: f64,
@@ -60,7 +60,7 @@ pub fn loss<'e>(enclosure: &'e Enclosure, shadow: &Shadow, output: &OutputBound)
         let operands = bound.operands.iter().zip(seen.reads);
         let factors = operands.map(|(operand, seen)| (operand, factor(operand.extent, seen)));
         let before = factors.clone().map(|(_, factor)| factor).fold(1.0, f64::max);
-        // What an operand brings without a known origin, as a loop's state does, was lost before, at no operation of this way.
+        // An operand without a known origin, as a loop's state is, brings a factor that arose at no operation of this way.
         let gain = if before.is_infinite() { 1.0 } else { whole / before };
         if best.is_none_or(|best| gain > best.gain) {
             best = Some(Loss { word, bound, seen, factor: whole, gain, later: steps });

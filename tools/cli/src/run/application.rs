@@ -10,8 +10,6 @@ use crate::terminal::output::Failure;
 use anyhow::{Result, anyhow};
 use std::path::Path;
 use takt_analysis::Bounds;
-#[cfg(feature = "board")]
-use takt_asm::names::NamedArray;
 use takt_system::SystemFault;
 
 pub(crate) enum Application {
@@ -52,11 +50,7 @@ impl Application {
             Application::Program(loaded) => (&loaded.program).into(),
             Application::System(system) => (&system.description).into(),
         };
-        let array = |array: &NamedArray| {
-            let NamedArray { name, base, sizes, ty } = array.clone();
-            takt_board::Array { name, base, sizes, ty }
-        };
-        let arrays = |loaded: &LoadedProgram| loaded.names.arrays.iter().map(array).collect();
+        let arrays = |loaded: &LoadedProgram| takt_live::arrays(&loaded.names);
         application.with_arrays(self.programs().iter().map(arrays).collect())
     }
 

@@ -49,14 +49,12 @@ impl Comparison<'_> {
             json!({ "name": bound.name, "measured": measured, "error": bound.error, "factor": factor })
         });
         measurement["bounds"] = bounds.collect();
-        let messages: Vec<Value> =
-            self.lost().iter().flat_map(Diagnostics::messages).map(|message| json!(message)).collect();
+        let messages: Vec<Value> = lost::warnings(self)
+            .iter()
+            .flat_map(Diagnostics::messages)
+            .map(|message| json!(message))
+            .collect();
         measurement["lost"] = messages.into();
-    }
-
-    /// Operations at which bounds are lost, each as a warning at its place.
-    fn lost(&self) -> Vec<Diagnostics> {
-        lost::warnings(self)
     }
 
     pub(super) fn text(&self, out: &mut Out) -> Result<()> {
@@ -87,7 +85,7 @@ impl Comparison<'_> {
             let (measured, most) = (number(*measured), number(bound.error));
             writeln!(out, "  {:<width$}  {measured:>12} {most:>12} {factor:>10}  {from}", bound.name)?;
         }
-        let lost = self.lost();
+        let lost = lost::warnings(self);
         if !lost.is_empty() {
             writeln!(out, "\nwhere bounds are lost\n")?;
         }

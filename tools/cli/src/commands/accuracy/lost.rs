@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Warnings at the operations where bounds are lost: ranges and errors that go in and come out, in the bound and in the run, and the rewriting
+//! Warnings at the operations where bounds are lost: ranges and errors of operands and result, in the bound and in the run, and the rewriting
 //! that keeps the bound.
 
 use super::comparison::{Compared, Comparison};
@@ -180,7 +180,7 @@ impl Words<'_> {
         }
     }
 
-    /// What goes in and comes out, as bounded and as the run shows it.
+    /// Ranges and errors of operands and result, as bounded and as the run shows them.
     fn notes(&self) -> Vec<String> {
         let text = |what: String, bound: Extent, seen: Seen| {
             let range = bound.range.map_or_else(|| "no known range".to_owned(), ends);
