@@ -49,11 +49,12 @@
         s = s + (ki*e + kb*(u - wish))
 .endm
 
-; Voltage circle, direct axis first: d keeps as much as the radius allows, q the rest.
-.macro circle_d_first ud:float, uq:float, d:float, q:float, radius:float
+; Voltage circle, direct axis first: d keeps as much as its share of the radius allows, q the rest. The share is below 1: at 1 nothing would
+; be left, and a root of nearly nothing loses half of the digits.
+.macro circle_d_first ud:float, uq:float, d:float, q:float, radius:float, share:float
 .reg    left
-        ud = sat(d, radius)
-        left = sqrt(max(radius*radius - ud*ud, 0))      ; rounding may leave a negative rest
+        ud = sat(d, share*radius)
+        left = sqrt(radius*radius - ud*ud)
         uq = sat(q, left)
 .endm
 
@@ -80,6 +81,14 @@
         middle = 0.5*(max(b, c, al) + min(b, c, al))
         gain = 1/udc
         da, db, dc = (al - middle)*gain + 0.5, (b - middle)*gain + 0.5, (c - middle)*gain + 0.5
+.endm
+
+; Space vectors of a voltage in parts of the bridge's, at most 1/√3.
+.macro space_vectors_of_parts da:float, db:float, dc:float, al:float, be:float
+.reg    b c shift
+        b, c = (sqrt(3)/2)*be - 0.5*al, -0.5*al - (sqrt(3)/2)*be
+        shift = 0.5 - 0.5*(max(b, c, al) + min(b, c, al))
+        da, db, dc = al + shift, b + shift, c + shift
 .endm
 
 ; Dead time: adds to the duty d, in place, the share of the carrier's period that dead time takes from a current i out of the half bridge.

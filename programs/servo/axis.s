@@ -23,6 +23,7 @@
 
 .const  wc    = 2*pi*1500               ; rad/s, bandwidth of the current loops
 .const  KB    = wc*T                    ; of the voltage that is cut off, taken from the integrators each period
+.const  DSHARE = 0.95                   ; of the longest voltage, for d; q keeps a third of it
 .const  LOSS  = 0.5e-6/T                ; share of the carrier that dead time takes
 .const  BAND  = 0.5                     ; A, within which its sign is not certain
 
@@ -46,22 +47,27 @@
 .const  FOLLOWING   = 4
 .const  ENCODER     = 8
 
-; Phases to duties in one period. w is the electrical speed in rad/s, drive 1 or 0; sd and sq are the integrators, in V, cleared while drive is 0.
-.macro current_loop da:float, db:float, dc:float, ia:float, ib:float, el:float, w:float, id_ref:float, iq_ref:float, udc:float, sd:float, sq:float, drive:int
-.reg    sn cs ibe d q ed eq vd vq ud uq al be bridge radius a b c
+; The bridge's voltage udc for the current loops, and its inverse.
+.macro bridge_of bridge:float, inverse:float, udc:float
         bridge = max(udc, UMIN)         ; below, the drive is off: duties stay numbers
+        inverse = 1/bridge
+.endm
+
+; Phases to duties in one period. w is the electrical speed in rad/s, drive 1 or 0; sd and sq are the integrators, in V, cleared while drive is 0.
+.macro current_loop da:float, db:float, dc:float, ia:float, ib:float, el:float, w:float, id_ref:float, iq_ref:float, bridge:float, inverse:float, sd:float, sq:float, drive:int
+.reg    sn cs ibe d q ed eq vd vq rd rq ud uq al be a b c
         turn_sincos sn, cs, el
         ibe = ia*(1/sqrt(3)) + ib*(2/sqrt(3))           ; Clarke without its copy: iα is ia, six cycles less for six axes on t3
         park d, q, ia, ibe, sn, cs
         ed, eq = id_ref - d, iq_ref - q
         vd = ed*(wc*Ld) + sd - q*Lq*w
         vq = eq*(wc*Lq) + sq + (d*Ld + psi)*w
-        radius = bridge*(1/sqrt(3))
-        circle_d_first ud, uq, vd, vq, radius
-        sd = drive ? sd + (ed*(wc*R*T) + (ud - vd)*KB) : 0
-        sq = drive ? sq + (eq*(wc*R*T) + (uq - vq)*KB) : 0
+        rd, rq = vd*inverse, vq*inverse         ; in parts of the bridge's voltage
+        circle_d_first ud, uq, rd, rq, 1/sqrt(3), DSHARE
+        sd = drive ? sd + (ed*(wc*R*T) + (ud*bridge - vd)*KB) : 0
+        sq = drive ? sq + (eq*(wc*R*T) + (uq*bridge - vq)*KB) : 0
         inverse_park al, be, ud, uq, sn, cs
-        space_vectors a, b, c, al, be, bridge
+        space_vectors_of_parts a, b, c, al, be
         dead_time a, ia, LOSS, BAND
         dead_time b, ib, LOSS, BAND
         al = -(ia + ib)

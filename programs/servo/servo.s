@@ -55,9 +55,10 @@
 
 .period
 period:
-.reg    el
+.reg    el bridge inverse
         electrical el, count, PAIRS, DIGITS
-        current_loop da, db, dc, ia, ib, el, w, id_ref, iq, udc, sd, sq, runs
+        bridge_of bridge, inverse, udc
+        current_loop da, db, dc, ia, ib, el, w, id_ref, iq, bridge, inverse, sd, sq, runs
         watch   bad, ia, ib, udc, error
         bad = enable ? bad : 0
         runs = enable & (bad == 0)

@@ -29,10 +29,11 @@
 .period
 period:
         measure
-.reg    el
+.reg    el bridge inverse
+        bridge_of bridge, inverse, udc
         .rep    i, 1, AXES
         electrical el, count[i], PAIRS, DIGITS
-        current_loop da[i], db[i], dc[i], ia[i], ib[i], el, w[i], 0.0, iq[i], udc, sd[i], sq[i], runs[i]
+        current_loop da[i], db[i], dc[i], ia[i], ib[i], el, w[i], 0.0, iq[i], bridge, inverse, sd[i], sq[i], runs[i]
         .endr
 .reg    flaw:int
         .rep    i, 1, AXES

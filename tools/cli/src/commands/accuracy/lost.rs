@@ -243,10 +243,17 @@ impl Words<'_> {
                 "{name} is never {below} {least} in this run: `{max}({x}, {least})` keeps it there, or `.assume {x} {sign} {least}` says that it is"
             )
         };
-        let within = |(operand, most): (usize, f64)| {
-            let (name, x, most) = (self.name(operand), self.short(operand), number(most));
+        let within = |(value, most): (usize, f64)| {
+            let (x, most) = (self.short(value), number(most));
+            // An operand and the result may have the same name.
+            let name = match self.source_name(value).filter(|_| value == self.operands()) {
+                Some(name) => format!("the result `{name}`"),
+                None => self.name(value),
+            };
+            let is_signed = self.seen(value).range.is_some_and(|range| range.low < 0.0);
+            let below = if is_signed { format!("`.assume {x} >= -{most}` and ") } else { String::new() };
             format!(
-                "{name} is never beyond {most} in this run: a narrower `.range`, `sat({x}, {most})` or `.assume {x} <= {most}` limits it"
+                "{name} is never beyond {most} in this run: a narrower `.range`, `sat({x}, {most})`, or {below}`.assume {x} <= {most}` limits it"
             )
         };
         let wide = || self.widest().map(within);
