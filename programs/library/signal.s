@@ -125,6 +125,8 @@
         at = at == at ? at : 0
         k = ftoi(max(at - 0.5, 0))      ; rounds; where two intervals meet, either will do
         k = k < n - 1 ? k : n - 2
-        part = at - itof(k)
+        part = at - itof(k)             ; at is between k and k + 1
+        .assume part >= 0
+        .assume part <= 1
 .endm
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -7,6 +7,7 @@
 .const  ALPHA = 1 - exp(-2*pi*80/RATE)  ; filter of first order, corner at 80 Hz
 .const  KP    = 20^2                    ; 1/s²: both poles of the error at 20 rad/s
 .const  KD    = 2*20                    ; 1/s
+.const  JUMP  = ceil(2*2.61/RATE/COUNT)    ; counts in a period: a joint at twice its highest speed, or a faulty encoder
 .const  STICK = 1/0.02                  ; s/rad: below 0.02 rad/s, Coulomb friction is proportional to the velocity
 
 .input  n[7]:int                        ; counts of the encoders
@@ -28,7 +29,7 @@
 period:
         .rep i, 1, 7
         q[i] = itof(n[i])*COUNT
-        raw[i] = itof(n[i] - before[i])*(COUNT*RATE)
+        raw[i] = sat(itof(n[i] - before[i]), JUMP)*(COUNT*RATE)
         before[i] = n[i]
         v[i] = v[i] + ALPHA*(raw[i] - v[i])
         id_q[i] = q[i]
