@@ -84,20 +84,8 @@ period:
         fsqrt   left, left
         fsat    uq, rq, left
 
-.reg    gd gq
-        fmul    gd, ud, udc
-        fmul    gq, uq, udc
-        fadd    gd, gd, fd
-        fsub    gq, gq, fq
-        fmul    gd, gd, KId
-        fmul    gq, gq, KIq
-        fmul    sd, sd, 1 - KId
-        fmul    sq, sq, 1 - KIq
-        fadd    sd, sd, gd
-        fadd    sq, sq, gq
-
 ; ---- Inverse Park and Clarke; the phases' middle goes to the bridge's middle --------------------------------------------------------
-.reg    al all be bee  h hb  vb vc  top low mid
+.reg    al all be bee  h hb  vb vc  low high mid
         fmul    al, ud, cs
         fmul    all, uq, sn
         fsub    al, al, all             ; va
@@ -108,21 +96,33 @@ period:
         fmul    hb, be, sqrt(3)/2
         fadd    vb, h, hb
         fsub    vc, h, hb
-        fmax    top, vb, vc
-        fmax    top, top, al
         fmin    low, vb, vc
-        fmin    low, low, al
-        fadd    mid, top, low
+        fmax    high, vb, vc
+        fmin    mid, high, al
+        fmax    mid, mid, low           ; the middle one of three that add up to zero
         fmul    mid, mid, 0.5
-        fsub    al, al, mid
-        fsub    vb, vb, mid
-        fsub    vc, vc, mid
+        fadd    al, al, mid
+        fadd    vb, vb, mid
+        fadd    vc, vc, mid
         fsat    al, al, 0.5             ; they are within it but for rounding
         fsat    vb, vb, 0.5
         fsat    vc, vc, 0.5
         fadd    da, al, 0.5
         fadd    db, vb, 0.5
         fadd    dc, vc, 0.5
+
+; ---- The integrators follow what the bridge gives beyond the decoupling ------------------------------------------------------------
+.reg    gd gq
+        fmul    gd, ud, udc
+        fmul    gq, uq, udc
+        fadd    gd, gd, fd
+        fsub    gq, gq, fq
+        fsub    gd, gd, sd
+        fsub    gq, gq, sq
+        fmul    gd, gd, KId
+        fmul    gq, gq, KIq
+        fadd    sd, sd, gd
+        fadd    sq, sq, gq
         wait    period
 
 ; For `takt accuracy`: sensors of ±20 A, a bridge between 18 V and 32 V, two turns, at most 10,000 rpm of four pole pairs. The integrators hold

@@ -96,7 +96,7 @@ period:
         fsat    uq, vq, left
 
 ; ---- Inverse Park and Clarke in one; the phases' middle goes to the bridge's middle -------------------------------------------------
-.reg    va vaq vb vbq vc vcq  top low mid  ha hb hc
+.reg    va vaq vb vbq vc vcq  low high mid  ha hb hc
         fmul    va, ud, ad
         fmul    vaq, uq, aq
         fsub    va, va, vaq
@@ -106,18 +106,17 @@ period:
         fmul    vc, ud, cd
         fmul    vcq, uq, cq
         fsub    vc, vc, vcq
-        fmax    top, vb, vc
-        fmax    top, top, va
         fmin    low, vb, vc
-        fmin    low, low, va
-        fadd    mid, top, low
+        fmax    high, vb, vc
+        fmin    mid, high, va
+        fmax    mid, mid, low           ; the middle one of three that add up to zero
         fmul    mid, mid, 0.5
         fadd    ha, va, 0.5
         fadd    hb, vb, 0.5
         fadd    hc, vc, 0.5
-        fsub    da, ha, mid
-        fsub    db, hb, mid
-        fsub    dc, hc, mid
+        fadd    da, ha, mid
+        fadd    db, hb, mid
+        fadd    dc, hc, mid
         publish
 
 ; ---- The integrators -----------------------------------------------------------------------------------------------------------
@@ -125,10 +124,10 @@ period:
         fadd    gd, ud, fd
         fsub    gq, uq, fq
         fsub    gq, gq, we_psi
+        fsub    gd, gd, sd
+        fsub    gq, gq, sq
         fmul    gd, gd, KId
         fmul    gq, gq, KIq
-        fmul    sd, sd, 1 - KId
-        fmul    sq, sq, 1 - KIq
         fadd    sd, sd, gd
         fadd    sq, sq, gq
 

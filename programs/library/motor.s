@@ -76,18 +76,18 @@
 
 ; Space vectors: duties in [0, 1] of three half bridges for a voltage of at most udc/√3; the phases' middle goes to the bridge's middle.
 .macro space_vectors da:float, db:float, dc:float, al:float, be:float, udc:float
-.reg    b c middle gain
+.reg    b c shift gain
         b, c = (sqrt(3)/2)*be - 0.5*al, -0.5*al - (sqrt(3)/2)*be
-        middle = 0.5*(max(b, c, al) + min(b, c, al))
+        shift = 0.5*max(min(max(b, c), al), min(b, c))          ; half of the middle one: the three add up to zero
         gain = 1/udc
-        da, db, dc = (al - middle)*gain + 0.5, (b - middle)*gain + 0.5, (c - middle)*gain + 0.5
+        da, db, dc = (al + shift)*gain + 0.5, (b + shift)*gain + 0.5, (c + shift)*gain + 0.5
 .endm
 
 ; Space vectors of a voltage in parts of the bridge's, at most 1/√3.
 .macro space_vectors_of_parts da:float, db:float, dc:float, al:float, be:float
 .reg    b c shift
         b, c = (sqrt(3)/2)*be - 0.5*al, -0.5*al - (sqrt(3)/2)*be
-        shift = 0.5 - 0.5*(max(b, c, al) + min(b, c, al))
+        shift = 0.5*max(min(max(b, c), al), min(b, c)) + 0.5
         da, db, dc = al + shift, b + shift, c + shift
 .endm
 

@@ -84,10 +84,10 @@ period:
         be = (ud*sn + uq*cs)*(sqrt(3)/2)
         vb = be - 0.5*al
         vc = -0.5*al - be
-        mid = (max(max(al, vb), vc) + min(min(al, vb), vc))*0.5
-        da = (al - mid)*scale + 0.5*FULL
-        db = (vb - mid)*scale + 0.5*FULL
-        dc = (vc - mid)*scale + 0.5*FULL
+        mid = max(min(max(vb, vc), al), min(vb, vc))*0.5        ; half of the middle one: the three add up to zero
+        da = (al + mid)*scale + 0.5*FULL
+        db = (vb + mid)*scale + 0.5*FULL
+        dc = (vc + mid)*scale + 0.5*FULL
         wait    period
 
 ; For `takt accuracy`: converters of 12 bits; an encoder of 13 bits with as many turns as frames hold; integrators within their limit.

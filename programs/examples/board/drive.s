@@ -77,10 +77,10 @@ period:
         be = (ud*sn + uq*cs)*(sqrt(3)/2)
         vb = be - 0.5*al
         vc = -0.5*al - be
-        mid = (max(max(al, vb), vc) + min(min(al, vb), vc))*0.5
-        da = (al - mid)*(FULL/UDC) + 0.5*FULL
-        db = (vb - mid)*(FULL/UDC) + 0.5*FULL
-        dc = (vc - mid)*(FULL/UDC) + 0.5*FULL
+        mid = max(min(max(vb, vc), al), min(vb, vc))*0.5        ; half of the middle one: the three add up to zero
+        da = (al + mid)*(FULL/UDC) + 0.5*FULL
+        db = (vb + mid)*(FULL/UDC) + 0.5*FULL
+        dc = (vc + mid)*(FULL/UDC) + 0.5*FULL
         wait    period
 
 ; For `takt accuracy`: what the converters give; counts of any number of turns; as much current as the converters measure; integrators
