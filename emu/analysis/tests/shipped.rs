@@ -260,8 +260,8 @@ impl Measured<'_> {
         }
     }
 
-    /// A case with random values: each of its own, each an end of its range, the same for all words of an array, or one of these for each
-    /// array. The errors of long sums are large where all terms have one sign, and matrices of one sign carry them on.
+    /// A case with random values: each of its own, each an end of its range, or the same for all words of an array. The errors of long sums are
+    /// large where all terms have one sign.
     fn case(&self, random: &mut Random) -> Case {
         let mut cells = Vec::new();
         let mut groups = 0;
@@ -279,17 +279,14 @@ impl Measured<'_> {
             let group = group();
             cells.extend(range.span().map(|word| (Cell::Word(word), range.ty, range.ends(), group)));
         }
-        let whole = random.below(5);
-        let (mut way, mut last) = (whole, (0, 0));
+        let way = random.below(4);
+        let mut last = (0, 0);
         let drawn = cells.into_iter().map(|(cell, ty, ends, group)| {
-            if whole == 4 && last.0 != group {
-                way = random.below(4);
-            }
             let bits = match way {
                 0 | 1 => draw(ty, ends, random),
                 2 => draw(ty, if random.below(2) == 0 { (ends.0, ends.0) } else { (ends.1, ends.1) }, random),
                 _ if last.0 == group => last.1,
-                _ => draw(ty, if random.below(2) == 0 { ends } else { (ends.1, ends.1) }, random),
+                _ => draw(ty, ends, random),
             };
             last = (group, bits);
             Drawn { cell, ty, ends, group, bits }
@@ -329,7 +326,7 @@ impl Measured<'_> {
         let mut most = self.error(begun, &best, place).unwrap_or(0.0);
         for turn in 0..periods {
             let mut case = best.clone();
-            if turn < periods / 4 {
+            if turn < periods / 8 {
                 case = self.case(&mut random);
             } else {
                 for _ in 0..=random.below(2) {
