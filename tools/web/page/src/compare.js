@@ -83,7 +83,7 @@ export class Comparison {
     this.pipelines = [new Pipeline(this.sides[0].box, () => {}), new Pipeline(this.sides[1].box, reveal)];
     this.all = node("input", { type: "checkbox" });
     this.all.addEventListener("change", () => this.rows());
-    this.total = node("p", { className: "compare-total" });
+    this.total = node("p", { className: "compare-total", textContent: "Assembling the other side …" });
     this.table = node("table", { className: "compare-lines" });
     const head = node("p", {}, "Cycles by line ", node("label", {}, this.all, " equal lines, too"));
     parent.replaceChildren(this.total, node("div", { className: "compare-sides" }, ...this.sides.map(({ element }) => element)), head, node("div", { className: "compare-scroll" }, this.table));

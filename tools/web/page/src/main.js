@@ -382,7 +382,7 @@ function showCycles() {
   if (run?.missed) put(` · ${plural(run.missed, "deadline")} missed`, "em");
   if (program.parameter_error) put(` · parameters as in the source: ${program.parameter_error}`, "em");
   if (program.plant_error) put(` · the loop is open: ${program.plant_error}`, "em");
-  if (program.inputs_of_others) put(` · all inputs are 0: ${program.inputs_of_others}`, "em");
+  if (program.inputs_of_others) put(` · the table is not read: ${program.inputs_of_others}`, "em");
   const least = Math.max(...periods.map((section) => section.least ?? 0)), more = [];
   if (run?.cycles.length) more.push(`measured in ${plural(run.cycles.length, "period")}`);
   if (least > 0) more.push(`no schedule takes fewer than ${least} cycles`);
@@ -397,7 +397,7 @@ function showProgram(program) {
   state.program = program;
   const { inputs_error: wrong } = program, whole = program.assembled && !wrong;
   const open = program.plant_error && `The loop is open: ${program.plant_error}`;
-  const others = program.inputs_of_others && `The table of inputs is for other ports, so that all are 0: ${program.inputs_of_others}`;
+  const others = program.inputs_of_others && `The table of inputs is for other ports, and is not read: ${program.inputs_of_others}`;
   el("text").textContent = [wrong && `error: ${wrong}`, open, others, program.text].filter(Boolean).join("\n\n") || "No errors, no warnings.";
   el("tab-messages").classList.toggle("bad", !whole);
   el("wait").hidden = true;

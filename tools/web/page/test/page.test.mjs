@@ -431,7 +431,7 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   await page.waitForFunction(() => /in 300 periods/.test(document.getElementById("more-text").textContent) && !document.body.classList.contains("stale"));
   // A table for other ports is none.
   await page.fill("#table", await example("pi.csv"));
-  await page.waitForFunction(() => /all inputs are 0: inputs: no column for the input ports ia/.test(document.getElementById("cycles").textContent));
+  await page.waitForFunction(() => /the table is not read: inputs: no column for the input ports ia/.test(document.getElementById("cycles").textContent));
   assert.match(await page.textContent("#text"), /table of inputs is for other ports/);
   assert.deepEqual(errors, []);
 });
@@ -512,7 +512,7 @@ test("plots have units, limits and what is no number; without numbers they say w
   await done(page);
   await write(page, ".input x\n.output y, z\n.period\nstart:\n    fdiv y, x, x\n    fadd z, x, x\n    wait start\n");
   await page.waitForFunction(() => document.querySelector(".chart-head .lost"));
-  assert.match(await page.locator(".chart-head").first().textContent(), /no number in 20 periods: NaN/);
+  assert.match(await page.locator(".chart-head").first().textContent(), /no number in 400 periods: NaN/);
   await write(page, "start:\n    halt\n");
   await page.waitForFunction(() => /nothing to plot/.test(document.querySelector(".why")?.textContent));
   assert.deepEqual(errors, []);
@@ -618,6 +618,13 @@ test("a plant closes the loop: its sliders move what it gives, and links carry i
   await page.waitForFunction(() => !takt.state.stale && takt.state.program?.plant === null && takt.state.run);
   assert.deepEqual(await values(page, "u"), u);
   assert.ok(await page.isHidden("#plant"));
+  // Without plant and table, a port whose range leaves 0 out is not 0: no output is NaN.
+  await page.selectOption("#example", "foc.s");
+  await page.waitForFunction(() => takt.state.name === "foc.s" && !takt.state.stale && takt.state.run);
+  await done(page);
+  await page.selectOption("#plant-name", "");
+  await page.waitForFunction(() => /all 7 input ports are 0, but udc 18 /.test(document.querySelector(".why")?.textContent));
+  assert.ok((await values(page, "da")).every((one) => typeof one === "number"), "duties are numbers");
   assert.deepEqual(errors, []);
 });
 
