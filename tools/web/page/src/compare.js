@@ -103,7 +103,7 @@ export class Comparison {
     const width = Math.min(...this.pipelines.map((one) => one.width || Infinity));
     for (const one of this.pipelines) Object.assign(one, { width }).resize();
     const [a, b] = [before.picture.cycles, after.picture.cycles];
-    this.total.replaceChildren(`${before.title}: `, node("b", { textContent: a }), ` → ${after.title}: `, node("b", { textContent: b }), ` cycles in the period (${signed(b - a)}${a ? `, ${signed((100 * (b - a)) / a)} %` : ""})`);
+    this.total.replaceChildren(`${before.title}: `, node("b", { textContent: a }), ` → ${after.title}: `, node("b", { textContent: b }), ` cycles in the period (${a === b ? "the same" : signed(b - a)}${a && a !== b ? `, ${signed((100 * (b - a)) / a)} %` : ""})`);
     const causes = Object.keys(KINDS).map((kind) => [kind, ...[before, after].map(({ picture }) => picture.bundles.flatMap(({ stalls }) => stalls).reduce((sum, one) => sum + (one.cause === kind && kind !== "wait" ? one.cycles : 0), 0))]);
     const moved = causes.filter(([, a, b]) => a !== b).map(([kind, a, b]) => `${kind} ${a} → ${b}`);
     if (moved.length) this.total.append(node("br"), node("span", { textContent: `stalled by ${moved.join(", ")}` }));

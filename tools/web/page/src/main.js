@@ -296,13 +296,16 @@ async function open({ name, source, inputs, periods, plant, parameters, changes,
   state.kept = null;
   showSides();
   empty();
-  if (state.about.examples.some((one) => one.track && isShipped(one, state.opened))) drive.prepare(true);
+  if (isDriven(state.opened)) drive.prepare(true);
   await assemble();
   await opened;
 }
 
 /** Whether an example is asked for as it is shipped, so that the build's results of it hold. */
 const isShipped = (example, wanted) => JSON.stringify(shipped(example, PERIODS)) === JSON.stringify(wanted);
+
+/** The build has driven the robot with this program. */
+const isDriven = (wanted) => state.about.examples.some((one) => one.track && isShipped(one, wanted));
 
 /** Empties all panels until the result of the opened text is there. */
 function empty() {
@@ -425,7 +428,8 @@ function showProgram(program) {
       el("drawn").textContent = why;
     }
   }
-  drive.old = whole;
+  // The build's drive is that of the same program.
+  drive.old = whole && !(drive.built && isDriven(asked()));
   if (whole) drive.fits = program.tracks;
   dimPipeline();
   if (!whole || !state.tuning) showCycles();

@@ -714,7 +714,7 @@ test("two machines, and a text before and after a change, stand side by side wit
   await shot(page, "compare-change");
   // What was kept, with sliders, plant and all.
   await page.click("#keep");
-  await page.waitForFunction(() => /^kept, on t3: (\d+) → now, on t3: \1 cycles in the period \(=/.test(document.querySelector(".compare-total").textContent));
+  await page.waitForFunction(() => /^kept, on t3: (\d+) → now, on t3: \1 cycles in the period \(the same\)/.test(document.querySelector(".compare-total").textContent));
   await page.selectOption("#against", "");
   await page.locator("#pipeline-picture").waitFor();
   assert.ok(await page.isHidden("#comparison"));
@@ -860,8 +860,14 @@ test("the robot and its path are there before the program is assembled", limit, 
   });
   assert.ok(early.drawn > 5000 && !early.tracks, `${early.drawn} points, before the program is assembled`);
   assert.match(early.drove, /34\.7 s of path; 112 cycles a period, .* 7\.8\d µm cutting, .*when this page was built/);
-  // On another machine the drive is another one.
+  // The page's own program repeats the drive; on another machine it is another one.
   await done(page);
+  await page.waitForFunction(() => takt.state.shown && !takt.state.stale);
+  const isOld = () => page.evaluate(() => document.getElementById("robot").classList.contains("old"));
+  assert.equal(await isOld(), false, "the drive is this program's");
+  await page.selectOption("#machine", "t4");
+  await page.waitForFunction(() => takt.state.program?.machine === "t4" && !takt.state.stale);
+  assert.equal(await isOld(), true, "the drive is another machine's");
   assert.deepEqual(errors, []);
 });
 
