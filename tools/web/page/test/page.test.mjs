@@ -543,6 +543,8 @@ test("a slider writes a constant, moves a trace, and leaves the trace before pal
   await page.waitForFunction(() => !takt.state.stale && !document.getElementById("assemble").disabled);
   const written = /\.const +KP += (\S+)/.exec(await page.evaluate(() => takt.text))[1];
   assert.ok(Number(written) > 1 && Number(written) <= 1.6, `KP = ${written} in the text`);
+  const column = (source) => source.split("\n").find((line) => /KP +=/.test(line)).indexOf(";");
+  assert.equal(column(await page.evaluate(() => takt.text)), column(text), "the comment keeps its column");
   assert.match(await page.textContent(".ghost"), /pale: before, with KP = 0\.8/);
   assert.ok((await pale()) > none + 40, `${await pale()} pale points, ${none} without a slider`);
   // The text that the slider has written is the text that runs elsewhere.
