@@ -246,12 +246,14 @@ def draw(file, curves):
     sys.path.insert(0, str(Path(__file__).parents[1] / "python/examples"))
     import pictures
 
+    # Grid lines would go through the words.
+    blank = {"frameon": True, "facecolor": "white", "edgecolor": "none", "framealpha": 1, "fancybox": False}
     figure, (left, top, below) = pictures.subplots(3, 7.4, height_ratios=[1.6, 1, 1])
     left.plot(*curves["path"], color="0.6", lw=3, solid_capstyle="round", label="LinuxCNC's path, where it cuts")
     left.plot(*curves["way"], color="0.8", lw=0.5)
     left.plot(*curves["tool"], color="C1", lw=0.8, label=f"the tool, its deviation {MAGNIFIED} times as large")
     left.set(aspect="equal", ylim=(-46, 86), xlabel="x, mm (y upwards)", title="agh.ngc, planned by LinuxCNC, cut by the hybrid robot")
-    left.legend(loc="upper left")
+    left.legend(loc="upper left", **blank)
     seconds, peaks = curves["error"]
     top.plot(seconds, peaks, color="C1", lw=0.5)
     top.set(xlabel="time on the board, s", title="distance of the tool from LinuxCNC's point, µm", xlim=(0, seconds[-1]), ylim=(0, None))
@@ -260,7 +262,7 @@ def draw(file, curves):
     below.step(*curves["drive"], color="C2", label="outputs drive (10) or are safe (0)")
     below.axvline(0, color="0.5", ls=":")
     below.set(xlabel="time after the link was cut, ms", xlim=(time[0], time[-1]), ylim=(0, 1.6 * speed.max()), title="the link is cut in mid-cut: the board brakes, and is safe")
-    below.legend(loc="upper right")
+    below.legend(loc="upper right", **blank)
     pictures.save(figure, file)
 
 

@@ -272,7 +272,8 @@ fn the_picture_of_the_documents() {
         "ulp l1d, sqrt(ll1)",
     ];
     let mut screen = screen(&mut console, &commands);
-    let picture = svg(drawn(&mut screen, 132, 40).buffer());
+    // As wide as a telephone shows legibly.
+    let picture = svg(drawn(&mut screen, 72, 44).buffer());
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/pictures/debug.svg");
     if std::env::var_os("TAKT_PICTURES").is_some() {
         std::fs::write(path, &picture).unwrap();
@@ -298,11 +299,10 @@ fn svg(buffer: &Buffer) -> String {
         _ => other,
     };
     let area = buffer.area;
+    let (width, height) = (f32::from(area.width) * WIDTH, area.height * HEIGHT);
     let mut text = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.1} {}\" font-family=\"monospace\" font-size=\"14\">\n\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.1} {height}\" width=\"{width:.1}\" height=\"{height}\" font-family=\"monospace\" font-size=\"14\">\n\
          <rect width=\"100%\" height=\"100%\" fill=\"#1c1c1c\"/>\n",
-        f32::from(area.width) * WIDTH,
-        area.height * HEIGHT
     );
     for y in 0..area.height {
         let cell = |x: u16| &buffer[(x, y)];

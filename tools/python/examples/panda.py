@@ -169,6 +169,18 @@ def picture(model: Any, path: Joints, file: str) -> None:
         matplotlib.image.imsave(file, renderer.render())
 
 
+#: Line of each case in the plot. A colour for each rate and measurement; of two cases that nearly agree, the first is broad and pale behind the second.
+LINES: dict[str, dict[str, Any]] = {
+    "10 kHz, no time for control": {"color": "C0"},
+    "10 kHz, exact to the cycle": {"color": "C0", "lw": 4, "alpha": 0.35, "zorder": 1},
+    "10 kHz, a period late": {"color": "C0", "ls": "--"},
+    "10 kHz, exact, encoders of 20 bits": {"color": "C1", "lw": 4, "alpha": 0.35, "zorder": 1},
+    "10 kHz, a period late, encoders": {"color": "C1", "ls": "--"},
+    "1 kHz, exact to the cycle": {"color": "C2", "lw": 4, "alpha": 0.35, "zorder": 1},
+    "1 kHz, a period late": {"color": "C2", "ls": "--"},
+}
+
+
 def plot(results: dict[str, Lap], file: str) -> None:
     import pictures
 
@@ -176,7 +188,8 @@ def plot(results: dict[str, Lap], file: str) -> None:
     for name, result in results.items():
         # The picture resolves about a thousand points.
         every = max(1, len(result.tip) // 1000)
-        axes.semilogy(np.linspace(0, LAP, len(result.tip))[::every], 1e6 * result.tip[::every], label=name)
+        axes.semilogy(np.linspace(0, LAP, len(result.tip))[::every], 1e6 * result.tip[::every], label=name, **LINES[name])
+    axes.yaxis.set_major_formatter("{x:g}")
     axes.set(xlabel="time, s", title="distance of the tip from its path, µm", xlim=(0, LAP), ylim=(1e-1, None))
     pictures.legend(figure, axes, 1)
     pictures.save(figure, file)

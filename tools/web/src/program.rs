@@ -2,10 +2,10 @@
 //! Assembly of the page's program.
 
 use crate::plant::PlantRequest;
-use crate::run::{ZERO_PERIODS, prepare};
+use crate::run::{ZERO_PERIODS, number, prepare};
 use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, constants, examples, plant, ports, view};
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 use std::num::NonZeroU64;
@@ -30,7 +30,7 @@ pub(crate) struct LoadedProgram {
     pub(crate) assembled: AssembledProgram,
     /// Bits of the parameters in the source, in their order.
     defaults: Vec<Option<u32>>,
-    /// Recorded inputs; `None`: all ports are 0.
+    /// Inputs by the period; `None`: all ports are 0.
     pub(crate) rows: Option<Arc<Rows>>,
     pub(crate) tick: Option<NonZeroU64>,
 }
@@ -60,7 +60,7 @@ pub(crate) struct AssembleRequest {
     /// Changes of parameters during the run, as a host makes them between two periods.
     #[serde(default)]
     changes: Vec<Change>,
-    /// Input table in CSV with a column for each input port. If it is blank or made for other ports, all ports are 0.
+    /// Input table in CSV with a column for each input port. If it is blank or made for other ports, all ports rest.
     #[serde(default)]
     inputs: String,
     /// Cycles between ticks; 0: a tick comes as soon as the program waits.
@@ -151,8 +151,8 @@ impl Playground {
             plant.map(|plant| (plant::close(&assembled, &plant, recorded, &changes, periods), plant));
         let (rows, plant, plant_error) = match closed {
             Some((Ok(closed), plant)) => (Some(closed), Some(plant), None),
-            Some((Err(error), _)) => (with_changes(rows, program, &changes, periods), None, Some(error)),
-            None => (with_changes(rows, program, &changes, periods), None, None),
+            Some((Err(error), _)) => (open_loop(rows, program, &changes, periods), None, Some(error)),
+            None => (open_loop(rows, program, &changes, periods), None, None),
         };
         let rows = rows.map(Arc::new);
         let tick = NonZeroU64::new(wanted.tick);
@@ -205,13 +205,21 @@ fn changes(program: &Program, wanted: &[Change]) -> Result<Changes, String> {
     Ok(changes)
 }
 
-/// Rows of a run without a plant, in which parameters change; without recorded rows, all ports are 0.
-fn with_changes(rows: Option<Rows>, program: &Program, changes: &Changes, periods: usize) -> Option<Rows> {
-    if changes.is_empty() {
+/// Bits of an input port that nobody gives: 0, or the value of its range that is nearest to it.
+fn resting(program: &Program, port: &Port) -> u32 {
+    let Some(range) = program.range(port.register) else { return 0 };
+    let (low, high) = range.ends();
+    bits(port.ty, 0_f64.clamp(low, high))
+}
+
+/// Rows of a run without a plant, in which parameters change; without recorded rows, all ports rest. `None` if they rest at 0, as the
+/// emulator begins.
+fn open_loop(rows: Option<Rows>, program: &Program, changes: &Changes, periods: usize) -> Option<Rows> {
+    let rest: Row = program.inputs.iter().map(|port| (port.register, resting(program, port))).collect();
+    if changes.is_empty() && rest.iter().all(|(_, bits)| *bits == 0) {
         return rows;
     }
-    let zeros = || program.inputs.iter().map(|port| (port.register, 0)).collect();
-    let mut rows = rows.unwrap_or_else(|| vec![zeros(); periods.min(PERIODS)]);
+    let mut rows = rows.unwrap_or_else(|| vec![rest; periods.min(PERIODS)]);
     for (period, change) in changes {
         if let Some(row) = rows.get_mut(*period) {
             row.extend(change);
@@ -297,6 +305,11 @@ fn facts(loaded: &LoadedProgram) -> Value {
     };
     let ports = |ports: &[Port], what: &str| ports.iter().map(|one| port(one, what)).collect::<Vec<_>>();
     let span = |span: Span| json!({ "best": span.best, "worst": span.worst });
+    let resting = program.inputs.iter().map(|port| (port, resting(program, port)));
+    let resting: Map<_, _> = resting
+        .filter(|(_, bits)| *bits != 0)
+        .map(|(port, bits)| (port.name.clone(), number(port.ty, Some(bits))))
+        .collect();
     let path = least_of_path(assembled);
     let section = |section: &SectionBounds| {
         let cycles = if section.once { section.cycles } else { section.in_time };
@@ -324,6 +337,7 @@ fn facts(loaded: &LoadedProgram) -> Value {
         "sampling_period": units::sampling_period(&sources, &assembled.constants),
         "data_words": program.data.len(),
         "inputs": ports(&program.inputs, ".input"),
+        "resting": resting,
         "outputs": ports(&program.outputs, ".output"),
         "tick": loaded.tick,
         "rows": loaded.rows.as_ref().map(|rows| rows.len()),

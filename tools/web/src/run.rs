@@ -74,7 +74,7 @@ pub(crate) fn prepare(emulator: &mut Emulator, rows: Option<&Rows>, period: u64)
 }
 
 /// Value of a port as a JSON number; null if it has none, and `"NaN"`, `"inf"`, `"-inf"` for values that JSON cannot represent.
-fn number(ty: Type, bits: Option<u32>) -> Value {
+pub(crate) fn number(ty: Type, bits: Option<u32>) -> Value {
     match (ty, bits) {
         (_, None) => Value::Null,
         (Type::F, Some(bits)) => match f32::from_bits(bits) {

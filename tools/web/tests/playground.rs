@@ -16,6 +16,27 @@ fn assemble(playground: &mut Playground, source: &str, inputs: &str) -> Value {
 
 const DOUBLE: &str = ".input x\n.output y\n.period\nstart:\n    fadd y, x, x\n    wait start\n";
 
+/// Without a table, a port whose range leaves 0 out begins at its nearest end: a division by it gives numbers.
+#[test]
+fn ports_without_inputs_rest_in_their_ranges() {
+    const RATIO: &str = ".input x, udc, n:int\n.range x = -1, 1\n.range udc = 18, 32\n.range n = -9, -3\n\
+        .output y\n.period\np: fdiv y, x, udc\n wait p\n";
+    let mut playground = Playground::default();
+    for table in ["", "other\n1\n"] {
+        let told = assemble(&mut playground, RATIO, table);
+        assert_eq!(told["resting"], json!({ "udc": 18.0, "n": -3 }));
+        let ran = call(&mut playground, "run", json!({ "begin": true }));
+        assert_eq!((&ran["outputs"]["y"][19], &ran["inputs"]["udc"][19]), (&json!(0.0), &json!(18.0)));
+        let shown = &told["view"]["inputs"];
+        let udc = shown.as_array().and_then(|all| all.iter().find(|one| one["name"] == "udc"));
+        assert_eq!(udc.expect("the debugger shows the ports")["value"], "18.0");
+    }
+    let told = assemble(&mut playground, RATIO, "x,udc,n\n1,0,0\n");
+    assert_eq!(told["rows"], 1);
+    assert_eq!(call(&mut playground, "run", json!({ "begin": true }))["outputs"]["y"], json!(["inf"]));
+    assert_eq!(assemble(&mut playground, DOUBLE, "")["resting"], json!({}));
+}
+
 /// A parameter acts without another assembly, is checked against its range, and has the source's value again when nothing else is wanted.
 #[test]
 fn parameters_are_set() {

@@ -83,7 +83,7 @@ export class Comparison {
     this.pipelines = [new Pipeline(this.sides[0].box, () => {}), new Pipeline(this.sides[1].box, reveal)];
     this.all = node("input", { type: "checkbox" });
     this.all.addEventListener("change", () => this.rows());
-    this.total = node("p", { className: "compare-total" });
+    this.total = node("p", { className: "compare-total", textContent: "Assembling the other side …" });
     this.table = node("table", { className: "compare-lines" });
     const head = node("p", {}, "Cycles by line ", node("label", {}, this.all, " equal lines, too"));
     parent.replaceChildren(this.total, node("div", { className: "compare-sides" }, ...this.sides.map(({ element }) => element)), head, node("div", { className: "compare-scroll" }, this.table));
@@ -103,7 +103,7 @@ export class Comparison {
     const width = Math.min(...this.pipelines.map((one) => one.width || Infinity));
     for (const one of this.pipelines) Object.assign(one, { width }).resize();
     const [a, b] = [before.picture.cycles, after.picture.cycles];
-    this.total.replaceChildren(`${before.title}: `, node("b", { textContent: a }), ` → ${after.title}: `, node("b", { textContent: b }), ` cycles in the period (${signed(b - a)}${a ? `, ${signed((100 * (b - a)) / a)} %` : ""})`);
+    this.total.replaceChildren(`${before.title}: `, node("b", { textContent: a }), ` → ${after.title}: `, node("b", { textContent: b }), ` cycles in the period (${a === b ? "the same" : signed(b - a)}${a && a !== b ? `, ${signed((100 * (b - a)) / a)} %` : ""})`);
     const causes = Object.keys(KINDS).map((kind) => [kind, ...[before, after].map(({ picture }) => picture.bundles.flatMap(({ stalls }) => stalls).reduce((sum, one) => sum + (one.cause === kind && kind !== "wait" ? one.cycles : 0), 0))]);
     const moved = causes.filter(([, a, b]) => a !== b).map(([kind, a, b]) => `${kind} ${a} → ${b}`);
     if (moved.length) this.total.append(node("br"), node("span", { textContent: `stalled by ${moved.join(", ")}` }));

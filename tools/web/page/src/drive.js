@@ -53,7 +53,7 @@ export class Drive {
 
   /** Discards the drive. */
   clear() {
-    this.tried = this.driving = false;
+    this.tried = this.driving = this.built = false;
     this.drives = (this.drives ?? 0) + 1;
     this.robot.play(false);
     this.robot.begin(null, 0);
@@ -75,7 +75,7 @@ export class Drive {
       if (mine !== this.drives || !this.idle) return;
       this.robot.begin(drive.base, drive.sample_time, drive.poses);
       if (!whole) return this.robot.draw();
-      this.tried = true;
+      this.tried = this.built = true;
       el("drive").disabled = el("scene").hidden = false;
       this.starts();
       this.robot.add(drive.poses);

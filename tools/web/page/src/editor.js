@@ -210,6 +210,8 @@ export class Editor {
     this.scheduled = 0;
     /** Places of the constants' values by name; they move with the text. */
     this.places = new Map();
+    // Columns of the comments behind constants: as they were, and as they were left.
+    this.columns = new Map();
     const follow = EditorView.updateListener.of((update) => {
       if (update.selectionSet && !update.docChanged) moved(this.line);
       if (!update.docChanged) return;
@@ -251,13 +253,24 @@ export class Editor {
 
   /** Gives constants other values: a map from names to texts. */
   tune(texts) {
-    const changes = [...texts].filter(([name]) => this.places.has(name)).map(([name, insert]) => ({ ...this.places.get(name), insert }));
+    const changes = [...texts].filter(([name]) => this.places.has(name)).flatMap(([name, insert]) => [{ ...this.places.get(name), insert }, ...this.aligned(name, insert)]);
     this.view.dispatch({ changes, userEvent: TUNE });
+  }
+
+  /** Change of the blanks behind a value, so that the comment keeps its column, or comes back to it from behind a long value. */
+  aligned(name, text) {
+    const { doc } = this.view.state, { from, to } = this.places.get(name), line = doc.lineAt(to), [blanks] = /^ +(?=;)/.exec(doc.sliceString(to, line.to)) ?? [""];
+    if (!blanks) return [];
+    const at = to + blanks.length - line.from, before = this.columns.get(name), column = before?.left === at ? before.column : at;
+    const end = from - line.from + text.length, more = Math.max(1, column - end) - blanks.length;
+    this.columns.set(name, { column, left: end + blanks.length + more });
+    return more > 0 ? [{ from: line.from + at, insert: " ".repeat(more) }] : more < 0 ? [{ from: line.from + at + more, to: line.from + at }] : [];
   }
 
   /** Opens a text under a name, for a machine. */
   async open(name, text, machine) {
     Object.assign(this, { name, machine });
+    this.columns.clear();
     this.close();
     this.view.dispatch({ changes: { from: 0, to: this.view.state.doc.length, insert: text }, selection: { anchor: 0 } });
     await this.connect();

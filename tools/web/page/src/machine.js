@@ -164,6 +164,7 @@ export class MachinePicture {
       flying.length ? `In flight: ${flying.map((one) => `${one.text} (${count(one.left, "cycle")})`).join(", ")}` : "Nothing is in flight",
       forwarded.length ? `forwarded in the cycle of issue: ${forwarded.join(", ")}` : "",
     ].filter(Boolean).join("; ") + ".";
-    this.legend.replaceChildren(node("i", { className: "mp-key-read" }), "operand from a bank", node("i", { className: "mp-key-forward" }), "forwarded: the result of this very cycle", node("i", { className: "mp-key-full" }), "operation in flight");
+    const key = (className, text) => node("span", {}, node("i", { className }), text);
+    this.legend.replaceChildren(key("mp-key-read", "operand from a bank"), key("mp-key-forward", "forwarded: the result of this very cycle"), key("mp-key-full", "operation in flight"));
   }
 }

@@ -296,13 +296,16 @@ async function open({ name, source, inputs, periods, plant, parameters, changes,
   state.kept = null;
   showSides();
   empty();
-  if (state.about.examples.some((one) => one.track && isShipped(one, state.opened))) drive.prepare(true);
+  if (isDriven(state.opened)) drive.prepare(true);
   await assemble();
   await opened;
 }
 
 /** Whether an example is asked for as it is shipped, so that the build's results of it hold. */
 const isShipped = (example, wanted) => JSON.stringify(shipped(example, PERIODS)) === JSON.stringify(wanted);
+
+/** The build has driven the robot with this program. */
+const isDriven = (wanted) => state.about.examples.some((one) => one.track && isShipped(one, wanted));
 
 /** Empties all panels until the result of the opened text is there. */
 function empty() {
@@ -382,7 +385,7 @@ function showCycles() {
   if (run?.missed) put(` · ${plural(run.missed, "deadline")} missed`, "em");
   if (program.parameter_error) put(` · parameters as in the source: ${program.parameter_error}`, "em");
   if (program.plant_error) put(` · the loop is open: ${program.plant_error}`, "em");
-  if (program.inputs_of_others) put(` · all inputs are 0: ${program.inputs_of_others}`, "em");
+  if (program.inputs_of_others) put(` · the table is not read: ${program.inputs_of_others}`, "em");
   const least = Math.max(...periods.map((section) => section.least ?? 0)), more = [];
   if (run?.cycles.length) more.push(`measured in ${plural(run.cycles.length, "period")}`);
   if (least > 0) more.push(`no schedule takes fewer than ${least} cycles`);
@@ -397,7 +400,7 @@ function showProgram(program) {
   state.program = program;
   const { inputs_error: wrong } = program, whole = program.assembled && !wrong;
   const open = program.plant_error && `The loop is open: ${program.plant_error}`;
-  const others = program.inputs_of_others && `The table of inputs is for other ports, so that all are 0: ${program.inputs_of_others}`;
+  const others = program.inputs_of_others && `The table of inputs is for other ports, and is not read: ${program.inputs_of_others}`;
   el("text").textContent = [wrong && `error: ${wrong}`, open, others, program.text].filter(Boolean).join("\n\n") || "No errors, no warnings.";
   el("tab-messages").classList.toggle("bad", !whole);
   el("wait").hidden = true;
@@ -425,7 +428,8 @@ function showProgram(program) {
       el("drawn").textContent = why;
     }
   }
-  drive.old = whole;
+  // The build's drive is that of the same program.
+  drive.old = whole && !(drive.built && isDriven(asked()));
   if (whole) drive.fits = program.tracks;
   dimPipeline();
   if (!whole || !state.tuning) showCycles();

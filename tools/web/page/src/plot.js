@@ -1,7 +1,7 @@
 // Plots of port values over periods, one chart below another, with synchronised cursors.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { COLOURS } from "./parts.js";
+import { COLOURS, short } from "./parts.js";
 import { Pen, drawing } from "./svg.js";
 
 /** Dashes of the curves in a chart, so that many differ in more than colour, and those of a reference. */
@@ -236,6 +236,9 @@ function mark(ctx, plot, { x, levels, lost, saturated, moments }) {
   ctx.restore();
 }
 
+/** Values of input ports that nobody gives. */
+const rest = ({ resting }) => ["0", ...Object.entries(resting).map(([name, value]) => `${name} ${short(value)} (of its .range nearest to 0)`)].join(", but ");
+
 export class Plots {
   /** `mark`: parameters that change during the run (`changes`), the period from which their sliders act (`from`), and what hears of another (`picked`).
    * @param tools controls: `axis` (periods, ms or s), `length` (of a period, in ms), `together` (curves over one axis: by unit, or each alone) */
@@ -370,7 +373,7 @@ export class Plots {
     const here = plants.find(({ name }) => name === plant?.name), driven = [...(here?.gives ?? []), ...(here?.states ?? [])], silent = inputs.filter(({ name }) => !driven.includes(name));
     if (!silent.length || (rows && !blank && !others)) return "";
     const count = silent.length, those = driven.length ? silent.map(({ name }) => name).join(", ") : count === 1 ? "the input port" : `all ${count} input ports`;
-    return `There are no inputs${driven.length ? " but the plant's" : ""}: ${those} ${count === 1 ? "is" : "are"} 0 in every period. The tab Inputs takes a table.`;
+    return `There are no inputs${driven.length ? " but the plant's" : ""}: ${those} ${count === 1 ? "is" : "are"} ${driven.length ? 0 : rest(this.program)} in every period. The tab Inputs takes a table.`;
   }
 
   /** Horizontal lines in the chart of cycles: bound and deadline. */

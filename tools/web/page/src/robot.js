@@ -245,8 +245,8 @@ export class Robot {
     for (const [drawn, colour, wide] of strokes) {
       g.beginPath();
       let drawing = false;
-      for (let i = 0; i <= this.shown; i++) {
-        const pose = this.poses[i];
+      // Before a drive, there is only what is ahead.
+      for (const pose of this.poses.slice(0, this.shown + 1)) {
         if (!drawn(pose)) drawing = false;
         else if (drawing) g.lineTo(...at(pose.slice(1, 4)));
         else (g.moveTo(...at(pose.slice(1, 4))), (drawing = true));

@@ -431,7 +431,7 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   await page.waitForFunction(() => /in 300 periods/.test(document.getElementById("more-text").textContent) && !document.body.classList.contains("stale"));
   // A table for other ports is none.
   await page.fill("#table", await example("pi.csv"));
-  await page.waitForFunction(() => /all inputs are 0: inputs: no column for the input ports ia/.test(document.getElementById("cycles").textContent));
+  await page.waitForFunction(() => /the table is not read: inputs: no column for the input ports ia/.test(document.getElementById("cycles").textContent));
   assert.match(await page.textContent("#text"), /table of inputs is for other ports/);
   assert.deepEqual(errors, []);
 });
@@ -512,7 +512,7 @@ test("plots have units, limits and what is no number; without numbers they say w
   await done(page);
   await write(page, ".input x\n.output y, z\n.period\nstart:\n    fdiv y, x, x\n    fadd z, x, x\n    wait start\n");
   await page.waitForFunction(() => document.querySelector(".chart-head .lost"));
-  assert.match(await page.locator(".chart-head").first().textContent(), /no number in 20 periods: NaN/);
+  assert.match(await page.locator(".chart-head").first().textContent(), /no number in 400 periods: NaN/);
   await write(page, "start:\n    halt\n");
   await page.waitForFunction(() => /nothing to plot/.test(document.querySelector(".why")?.textContent));
   assert.deepEqual(errors, []);
@@ -543,6 +543,8 @@ test("a slider writes a constant, moves a trace, and leaves the trace before pal
   await page.waitForFunction(() => !takt.state.stale && !document.getElementById("assemble").disabled);
   const written = /\.const +KP += (\S+)/.exec(await page.evaluate(() => takt.text))[1];
   assert.ok(Number(written) > 1 && Number(written) <= 1.6, `KP = ${written} in the text`);
+  const column = (source) => source.split("\n").find((line) => /KP +=/.test(line)).indexOf(";");
+  assert.equal(column(await page.evaluate(() => takt.text)), column(text), "the comment keeps its column");
   assert.match(await page.textContent(".ghost"), /pale: before, with KP = 0\.8/);
   assert.ok((await pale()) > none + 40, `${await pale()} pale points, ${none} without a slider`);
   // The text that the slider has written is the text that runs elsewhere.
@@ -618,6 +620,13 @@ test("a plant closes the loop: its sliders move what it gives, and links carry i
   await page.waitForFunction(() => !takt.state.stale && takt.state.program?.plant === null && takt.state.run);
   assert.deepEqual(await values(page, "u"), u);
   assert.ok(await page.isHidden("#plant"));
+  // Without plant and table, a port whose range leaves 0 out is not 0: no output is NaN.
+  await page.selectOption("#example", "foc.s");
+  await page.waitForFunction(() => takt.state.name === "foc.s" && !takt.state.stale && takt.state.run);
+  await done(page);
+  await page.selectOption("#plant-name", "");
+  await page.waitForFunction(() => /all 7 input ports are 0, but udc 18 /.test(document.querySelector(".why")?.textContent));
+  assert.ok((await values(page, "da")).every((one) => typeof one === "number"), "duties are numbers");
   assert.deepEqual(errors, []);
 });
 
@@ -707,7 +716,7 @@ test("two machines, and a text before and after a change, stand side by side wit
   await shot(page, "compare-change");
   // What was kept, with sliders, plant and all.
   await page.click("#keep");
-  await page.waitForFunction(() => /^kept, on t3: (\d+) → now, on t3: \1 cycles in the period \(=/.test(document.querySelector(".compare-total").textContent));
+  await page.waitForFunction(() => /^kept, on t3: (\d+) → now, on t3: \1 cycles in the period \(the same\)/.test(document.querySelector(".compare-total").textContent));
   await page.selectOption("#against", "");
   await page.locator("#pipeline-picture").waitFor();
   assert.ok(await page.isHidden("#comparison"));
@@ -853,8 +862,14 @@ test("the robot and its path are there before the program is assembled", limit, 
   });
   assert.ok(early.drawn > 5000 && !early.tracks, `${early.drawn} points, before the program is assembled`);
   assert.match(early.drove, /34\.7 s of path; 112 cycles a period, .* 7\.8\d µm cutting, .*when this page was built/);
-  // On another machine the drive is another one.
+  // The page's own program repeats the drive; on another machine it is another one.
   await done(page);
+  await page.waitForFunction(() => takt.state.shown && !takt.state.stale);
+  const isOld = () => page.evaluate(() => document.getElementById("robot").classList.contains("old"));
+  assert.equal(await isOld(), false, "the drive is this program's");
+  await page.selectOption("#machine", "t4");
+  await page.waitForFunction(() => takt.state.program?.machine === "t4" && !takt.state.stale);
+  assert.equal(await isOld(), true, "the drive is another machine's");
   assert.deepEqual(errors, []);
 });
 
