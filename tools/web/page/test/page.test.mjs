@@ -979,7 +979,7 @@ test("plots: ports over one axis, time, folded constants, files", limit, async (
   await done(page);
   const heads = async () => (await page.locator(".chart-head").allTextContents()).map((text) => text.replace(/ +$/, ""));
   // A port stands over its reference.
-  assert.deepEqual(await heads(), ["id, iq, id_ref, iq_ref, A", "da, db, dc", "we, rad/s", "cycles 127 in every period; at most 132, whatever the inputs"]);
+  assert.deepEqual(await heads(), ["id, iq, id_ref, iq_ref, A", "da, db, dc", "we, rad/s", "cycles 123 in every period; at most 128, whatever the inputs"]);
   assert.equal(await page.locator("#charts canvas").count(), 3, "constant cycles are a line");
   assert.deepEqual([await page.inputValue("#axis"), await page.inputValue("#length")], ["ms", "0.05"]);
   await page.locator(".u-over").first().hover();
@@ -997,7 +997,7 @@ test("plots: ports over one axis, time, folded constants, files", limit, async (
   const csv = await take("#plot-csv"), rows = csv.text.trim().split("\n").map((line) => line.split(","));
   assert.equal(csv.name, "foc.csv");
   assert.deepEqual(rows[0], ["period", "time_s", "da", "db", "dc", "id", "iq", "ia", "ib", "theta", "we", "udc", "id_ref", "iq_ref", "cycles"]);
-  assert.deepEqual([rows.length, rows[3][0], rows[3][1], rows[3].at(-1)], [321, "3", "0.0001", "127"]);
+  assert.deepEqual([rows.length, rows[3][0], rows[3][1], rows[3].at(-1)], [321, "3", "0.0001", "123"]);
   assert.equal(Number(rows[200][2]), (await values(page, "da"))[199]);
   const svg = await take("#plot-svg");
   assert.equal(svg.name, "foc.svg");
