@@ -2,6 +2,7 @@
 //! Examples in `programs/examples/`: each on every machine, over its recorded inputs, against an independent implementation in binary64;
 //! and their costs, in `docs/examples.md`.
 
+mod axes;
 mod listings;
 mod reference;
 
