@@ -699,6 +699,12 @@ test("two machines, and a text before and after a change, stand side by side wit
   await page.waitForFunction(() => /^on t1: 65 → on t3: 38 cycles in the period \(−27, −41\.5 %\)/.test(document.querySelector(".compare-total")?.textContent ?? ""));
   assert.ok(requests.length > 0 && requests.every((path) => path.startsWith("/parts/") || path === "/worker.js"), `${requests}`);
   assert.equal(await page.locator(".compare-pipeline .tp-scroll").count(), 2);
+  // Ten cycles are as wide in both pictures.
+  const tens = await page.locator(".compare-pipeline .tp-axis").evaluateAll((axes) => axes.map((axis) => {
+    const at = (cycle) => Number([...axis.querySelectorAll("text")].find(({ textContent }) => textContent === cycle).getAttribute("x"));
+    return at("20") - at("10");
+  }));
+  assert.ok(tens[0] > 0 && tens[0] === tens[1], `${tens}`);
   const row = (text) => page.locator(".compare-lines tbody tr", { hasText: text }).locator("td").allTextContents();
   assert.deepEqual(await row("fmul p, e, KP"), ["27", "fmul    p, e, KP", "1", "8", "5", "−3"]);
   const total = () => page.locator(".compare-lines tfoot td").allTextContents();
