@@ -216,8 +216,9 @@ class Checker:
             # Half of a subnormal's unit: the product of a value with a constant power of two, by cases.
             a, b = self.steps[step["of"][0]]["of"]
             value, power = (a, b) if self.steps[b]["rule"] == "constant" else (b, a)
-            at = spelled(Q(1, 2**126) / abs(self.steps[power]["run"][0]))
-            lines.append(f"$ v{value} in (-{at}, {at});")
+            if by := abs(self.steps[power]["run"][0]):
+                at = spelled(Q(1, 2**126) / by)
+                lines.append(f"$ v{value} in (-{at}, {at});")
         return "\n".join(lines) + "\n"
 
 
