@@ -73,8 +73,9 @@ impl Law {
     /// A line with the names of an axis.
     fn renamed(&self, line: &str, axis: usize) -> String {
         let mut out = String::new();
-        for word in line.split_inclusive(|c: char| !c.is_ascii_alphanumeric() && c != '_') {
-            let name = word.trim_end_matches(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+        let ends = |c: char| !c.is_ascii_alphanumeric() && c != '_';
+        for word in line.split_inclusive(ends) {
+            let name = word.trim_end_matches(ends);
             match self.names.contains(name) {
                 true => write!(out, "{name}_{axis}{}", &word[name.len()..]).unwrap(),
                 false => out += word,
@@ -151,7 +152,7 @@ fn axes_side_by_side_compute_what_each_computes_alone() {
                     let (name, axis) = port.rsplit_once('_').expect("it has an axis");
                     let axis: usize = axis.parse().expect("a number");
                     let expected = alone[axis - 1][period][&format!("{name}_1")];
-                    // Which product is fused into a sum depends on the rest of its block.
+                    // The choice of a sum's product to fuse depends on the rest of the block.
                     let apart = f32::from_bits(*bits) - f32::from_bits(expected);
                     let is_same = *bits == expected || contract == Contract::All && apart.abs() <= ROUNDING;
                     assert!(

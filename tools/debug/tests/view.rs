@@ -272,7 +272,7 @@ fn the_picture_of_the_documents() {
         "ulp l1d, sqrt(ll1)",
     ];
     let mut screen = screen(&mut console, &commands);
-    // As wide as a telephone shows legibly.
+    // The width is legible on a telephone.
     let picture = svg(drawn(&mut screen, 72, 44).buffer());
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/pictures/debug.svg");
     if std::env::var_os("TAKT_PICTURES").is_some() {
