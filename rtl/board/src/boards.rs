@@ -15,6 +15,7 @@ const FILES: &[(&str, &str)] = &[
     ("orangecrab", include_str!("../boards/orangecrab.toml")),
     ("ecpix5-45f", include_str!("../boards/ecpix5-45f.toml")),
     ("ecpix5-85f", include_str!("../boards/ecpix5-85f.toml")),
+    ("tang-nano-9k", include_str!("../boards/tang-nano-9k.toml")),
     ("tang-nano-20k", include_str!("../boards/tang-nano-20k.toml")),
     ("tang-primer-20k", include_str!("../boards/tang-primer-20k.toml")),
     ("tang-primer-25k", include_str!("../boards/tang-primer-25k.toml")),

@@ -11,8 +11,9 @@
 // a count and that many words of `see`; a count and that many moments in which outputs of a core became safe, or trips rose: the cycle, the
 // core, and the words of `look` but the first. The last word has the trips that rose; it is 0 where outputs of the core became safe.
 //
-// pins.h, which is generated, gives DIVIDE, INPUTS, OUTPUTS and the pins; watch.h CORES and look, whose first word is whether a core's
-// outputs drive, ticks, and see with SEEN, the registers that the program reads. Of a circuit that is not watched, CORES and SEEN are 0.
+// pins.h, which is generated, gives UART, which is 0 for a board without one, DIVIDE, INPUTS, OUTPUTS and the pins; watch.h CORES and look,
+// whose first word is whether a core's outputs drive, ticks, and see with SEEN, the registers that the program reads. Of a circuit that is not
+// watched, CORES and SEEN are 0.
 
 #include "Vtop.h"
 #include "Vtop___024root.h"
@@ -34,6 +35,14 @@ template <std::size_t N> static uint32_t bits(const VlWide<N> &value, unsigned l
 
 #include "pins.h"
 #include "watch.h"
+
+#if UART
+static void to_board(Vtop &top, uint32_t level) { top.uart_receive = level; }
+static uint32_t from_board(const Vtop &top) { return top.uart_send; }
+#else
+static void to_board(Vtop &, uint32_t) {}
+static uint32_t from_board(const Vtop &) { return 1; }
+#endif
 
 static const unsigned LOOKED = 9;   // words of `look`
 #if CORES == 0
@@ -67,7 +76,7 @@ int main(int argc, char **argv) {
     input_pins(&top, inputs);
     output_pins(&top, outputs);
     top.clk_in = 0;
-    top.uart_receive = 1;
+    to_board(top, 1);
     std::deque<uint32_t> sends;
     uint32_t shift = 0, bits = 0, left = 0;              // what is being sent to the board
     uint32_t got = 0, got_bits = 0, got_left = 0;        // what comes from it
@@ -124,7 +133,7 @@ int main(int argc, char **argv) {
                 bits = 10;
                 left = DIVIDE;
             }
-            top.uart_receive = bits ? shift & 1 : 1;
+            to_board(top, bits ? shift & 1 : 1);
             if (bits && --left == 0) {
                 shift >>= 1;
                 bits--;
@@ -148,13 +157,13 @@ int main(int argc, char **argv) {
                 drove[core] = words[0];
             }
             if (got_bits == 0) {
-                if (!top.uart_send) {
+                if (!from_board(top)) {
                     got_bits = 10;
                     got_left = DIVIDE / 2;
                     got = 0;
                 }
             } else if (--got_left == 0) {
-                got = got >> 1 | uint32_t(top.uart_send) << 9;
+                got = got >> 1 | from_board(top) << 9;
                 got_left = DIVIDE;
                 if (--got_bits == 0 && got >> 9) {
                     uint32_t byte = got >> 1 & 255;

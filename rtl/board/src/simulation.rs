@@ -428,7 +428,8 @@ fn build(
     }
     let divide = (wiring.clock * 1e6 / f64::from(wiring.baud)).round();
     let mut header = format!(
-        "#define DIVIDE {divide}\n#define INPUTS {}\n#define OUTPUTS {}\n",
+        "#define UART {}\n#define DIVIDE {divide}\n#define INPUTS {}\n#define OUTPUTS {}\n",
+        u8::from(wiring.uart),
         inputs.len(),
         outputs.len()
     );

@@ -36,6 +36,9 @@ pub struct Wiring {
     pub period: u32,
     /// Cycles by which conversions start before the tick.
     pub lead: u32,
+    /// A host reads and writes registers over a UART. Without one, the program starts by itself, and an image that nobody changes has just
+    /// the room for it.
+    pub uart: bool,
     /// Bits per second of the UART.
     pub baud: u32,
     /// The program runs, and drives, from power-up on.
@@ -184,6 +187,7 @@ impl Wiring {
             clock: board.clock.1,
             period,
             lead: 0,
+            uart: true,
             baud: BAUD,
             autostart: false,
             deadlines: 1,
@@ -459,7 +463,11 @@ impl<'a> Reader<'a> {
         let autostart = top.boolean("autostart").is_some_and(|at| at.value);
         let deadlines = top.integer("deadlines", 1, 65535).map_or(1, |at| at.value);
         let host = top.integer("host", 0, 65535).map_or(0, |at| at.value);
-        let observe = top.boolean("observe").is_none_or(|at| at.value);
+        let uart = top.boolean("uart").is_none_or(|at| at.value);
+        if !uart {
+            self.check_alone(top);
+        }
+        let observe = top.boolean("observe").map_or(uart, |at| at.value);
         let mut signals = [const { None }; SIGNALS.len()];
         if let Some(table) = top.table("signals") {
             for (signal, pin) in SIGNALS.iter().zip(&mut signals) {
@@ -482,6 +490,7 @@ impl<'a> Reader<'a> {
             clock,
             period: period?,
             lead: lead?,
+            uart,
             baud: baud.map_or(BAUD, |at| at.value),
             autostart,
             deadlines,
@@ -493,6 +502,27 @@ impl<'a> Reader<'a> {
             scope,
             peripherals,
         })
+    }
+
+    /// Checks that a board without a UART starts by itself, and that nothing of the wiring is for a host.
+    fn check_alone(&self, top: &Table<'a>) {
+        let starts = top.boolean("autostart");
+        if !starts.as_ref().is_some_and(|at| at.value) {
+            let place = starts.map(|at| at.place).or_else(|| top.place_of("uart")).unwrap_or(0..0);
+            self.document.mistake(
+                &place,
+                "without a UART nobody starts the program: `uart = false` needs `autostart = true`",
+            );
+        }
+        let is_on = top.boolean("observe").is_some_and(|at| at.value);
+        for key in ["baud", "host", "scope"].into_iter().chain(is_on.then_some("observe")) {
+            if let Some(place) = top.place_of(key) {
+                let text = format!(
+                    "`{key}` is for a host, which `uart = false` leaves out: leave out one of the two"
+                );
+                self.document.mistake(&place, text);
+            }
+        }
     }
 
     /// The table `[scope]`: channels and samples are powers of two.

@@ -67,3 +67,45 @@ fn impossible_clocks_and_designs_are_refused_before_a_tool_starts() {
     let said = refused("icebreaker", 12.0);
     assert!(said.starts_with("the program needs ") && said.ends_with("; the iCE40UP5K has 30"), "{said}");
 }
+
+/// The example for small devices: source, machine, and the boards' wirings with the PLL's cell and a line of the constraints.
+const SERVO: &str = include_str!("../../../programs/examples/board/step/servo.s");
+const SMALL: &str = include_str!("../../../programs/examples/board/step/machine.toml");
+const SMALL_BOARDS: [(&str, &str, &str, &str); 2] = [
+    (
+        "icebreaker",
+        include_str!("../../../programs/examples/board/step/icebreaker.toml"),
+        "SB_PLL40_PAD",
+        "set_io motor_high 47",
+    ),
+    (
+        "tang-nano-9k",
+        include_str!("../../../programs/examples/board/step/tang-nano-9k.toml"),
+        "assign clk    = clk_in;",
+        "IO_LOC \"motor_high\" 29;",
+    ),
+];
+
+/// A board without a host has no UART, and an image that has just the room for the program.
+#[test]
+fn small_devices_have_circuits_without_a_host() {
+    let loader = MemoryLoader::new(&[("servo.s", SERVO), ("machine.toml", SMALL)]);
+    let servo = assemble("servo.s", &loader, &Options::default())
+        .unwrap_or_else(|errors| panic!("{}", errors.render(false)))
+        .program;
+    for (name, text, pll, place) in SMALL_BOARDS {
+        let board = board(name);
+        let wiring = Wiring::read("w.toml", text, &board).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+        wiring.check("w.toml", text, &servo).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+        let circuit = top::circuit(&board, &wiring, &servo).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let top = circuit.files.iter().find(|file| file.name == "takt_board.v").expect("a top");
+        assert!(top.text.contains(pll), "{name}: no {pll} in\n{}", top.text);
+        let (_, pins) = &circuit.pins;
+        assert!(pins.lines().any(|line| line == place), "{name}: no {place} in\n{pins}");
+        assert!(!pins.contains("uart") && !top.text.contains("uart"), "{name}");
+        assert!(
+            circuit.files.iter().all(|file| !file.name.contains("uart") && !file.name.contains("bridge"))
+        );
+        assert!(circuit.records <= circuit.room && circuit.room < 2 * circuit.records, "{name}");
+    }
+}

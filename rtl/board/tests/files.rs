@@ -79,6 +79,37 @@ fn builtin_boards_are_right() {
     );
 }
 
+/// A wiring without a UART.
+const ALONE: &str = r#"
+period = 400.0
+autostart = true
+uart = false
+
+[peripheral.encoder]
+kind = "quadrature"
+pins = { a = "gp0", b = "gn0" }
+ports = { count = "n" }
+"#;
+
+#[test]
+fn nothing_is_for_a_host_without_a_uart() {
+    let wiring = Wiring::read("robot.toml", ALONE, &ulx3s()).expect("it is right");
+    assert_eq!((wiring.uart, wiring.autostart, wiring.observe), (false, true, false));
+    let starts = "without a UART nobody starts the program: `uart = false` needs `autostart = true`";
+    for (what, by, place, says) in [
+        ("autostart = true\n", "", "3:1", starts),
+        ("autostart = true", "autostart = false", "3:13", starts),
+        ("uart", "observe = true\nuart", "4:1", "`observe` is for a host"),
+        ("uart", "baud = 1_000_000\nuart", "4:1", "`baud` is for a host"),
+        ("uart", "host = 3\nuart", "4:1", "`host` is for a host"),
+        ("[peripheral.encoder]", "[scope]\n[peripheral.encoder]", "6:", "`scope` is for a host"),
+    ] {
+        let said = mistakes_in(&ALONE.replacen(what, by, 1));
+        let [said] = &said[..] else { panic!("{by}: {said:?}") };
+        assert!(said.contains(says) && said.contains(&format!("robot.toml:{place}")), "{by}: {said}");
+    }
+}
+
 #[test]
 fn every_kind_has_a_module_and_a_model() {
     for kind in KINDS {

@@ -406,7 +406,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_biss_c.v", "answers ? FIRST - 17'd1 :", "answers ? FIRST :"),
         ("takt_sinc3.v", "quick >= BOUND | quick <= -BOUND", "quick >= BOUND"),
         ("takt_hall.v", "now == 3'd5 ? 3'd0 : now + 3'd1", "now + 3'd1"),
-        ("takt_tick.v", "left == ahead + 32'd1", "left == ahead"),
+        ("takt_tick.v", "count == ahead + ONE", "count == ahead"),
         ("takt_carrier.v", "if (place == TOP) back", "if (place == TOP - 16'd1) back"),
         ("takt_pwm_phase.v", "(~first & was)", "(1'b0 & was)"),
         ("takt_trip.v", "if (asks) held", "if (asks & take) held"),

@@ -12,6 +12,7 @@ use takt_board::simulation::{EncoderMotion, Simulation};
 use takt_board::tools::Venv;
 use takt_board::wiring::Peripheral;
 use takt_board::{Application, Board, Host, Wiring, build, model, netlist, top};
+use takt_family::Models;
 use takt_isa::timing::Span;
 use takt_isa::{Program, T1};
 
@@ -185,6 +186,43 @@ fn a_published_period_can_miss_its_deadline() {
     assert!(host.register("misses").expect("a register") >= 2);
 }
 
+/// A board without a UART drives its pins as one with a UART to which nobody talks, cycle by cycle.
+#[test]
+fn without_a_uart_the_pins_are_the_same() {
+    let (board, _, first, folder) = target("board-alone");
+    let of = |text: &str, name: &str| {
+        let wiring =
+            Wiring::read("wiring.toml", text, &board).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+        let folder = folder.join(name);
+        Simulation::new(&board, &wiring, &first, &folder).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let heard = WIRING.replace("host = 400\n", "");
+    assert_ne!(heard, WIRING);
+    let alone = heard.replace("baud = 5_000_000\n", "uart = false\n");
+    assert_ne!(alone, heard);
+    let mut both = [of(&heard, "uart"), of(&alone, "none")];
+    let mut drove = 0;
+    for run in 0..400 {
+        let levels: Vec<Vec<(bool, u32)>> = both
+            .iter_mut()
+            .map(|board| {
+                // The encoder turns from the start on; `stop` ends the run.
+                let pins = ["encoder_a", "encoder_b"].map(|pin| board.input(pin).expect("a pin"));
+                board.turns = vec![EncoderMotion { pins, from: 3 * run, by: 3 }];
+                board.set("signal_stop", run >= 380);
+                board.run(211, &[]).expect("it runs");
+                board.output_levels().collect()
+            })
+            .collect();
+        // Before the reset has ended, registers hold anything.
+        if run * 211 > top::RESET as i32 {
+            assert_eq!(levels[0], levels[1], "run {run}");
+        }
+        drove += levels[1].iter().map(|(_, high)| high).sum::<u32>();
+    }
+    assert!(drove > 0 && both.iter_mut().all(safe));
+}
+
 static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// Each reason for safe outputs is reported when it occurs: a pin, the host, a value in the program.
@@ -258,10 +296,7 @@ fn the_routed_design_does_the_same() {
         return;
     }
     let (board, wiring, first, folder) = target("board-routed");
-    let venv = std::env::var_os("TAKT_VENV")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.venv"), PathBuf::from);
-    let venv =
-        Venv::with(&venv, &build::packages(&board).expect("tools")).unwrap_or_else(|error| panic!("{error}"));
+    let venv = tools(&board);
     let models = board.family.models.as_ref().expect("models of the cells");
     let options = build::Options { seed: 1, seeds: 1, time: None, netlist: true };
     std::fs::create_dir_all(&folder).expect("the target folder can be written");
@@ -273,17 +308,93 @@ fn the_routed_design_does_the_same() {
     };
     runs_talks_and_fails_safe(simulated(&|_| ()), &wiring, &first);
     // One table of the PWM's logic inverted.
-    let faulty = simulated(&|cells| {
-        let mut pwm = cells.iter_mut().filter(|(name, _)| name.contains("u_motor")).map(|(_, cell)| cell);
-        let table = pwm.find_map(|cell| (models.truth_table)(cell)).expect("the PWM has logic");
-        let bits = table.as_str().expect("a table").chars();
-        let inverted: String = bits.map(|bit| if bit == '0' { '1' } else { '0' }).collect();
-        *table = inverted.into();
-    });
+    let faulty = simulated(&|cells| invert_a_table(cells, models, "u_motor"));
     let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| {
         runs_talks_and_fails_safe(faulty, &wiring, &first);
     }));
     assert!(noticed.is_err(), "the planted fault was not noticed");
+}
+
+/// The example for small devices.
+const STEP: &str = "../../programs/examples/board/step";
+
+/// Runs the placed and routed netlist of the example for small devices on an iCEBreaker beside its circuit: the pins are the same in each
+/// cycle. A fault planted in the netlist must be found. With `TAKT_ROUTED=1` only, like the test above.
+#[test]
+fn the_routed_design_without_a_host_drives_the_same_pins() {
+    if std::env::var_os("TAKT_ROUTED").is_none() {
+        return;
+    }
+    let read = |name: &str| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(STEP).join(name);
+        std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+    };
+    let (source, row, text) = (read("servo.s"), read("machine.toml"), read("icebreaker.toml"));
+    let board = Board::from_name("icebreaker").expect("a board").expect("a right one");
+    let wiring = Wiring::read("icebreaker.toml", &text, &board).expect("a right wiring");
+    let loader = MemoryLoader::new(&[("servo.s", source.as_str()), ("machine.toml", row.as_str())]);
+    let servo = assemble("servo.s", &loader, &Options::default()).unwrap_or_else(|e| panic!("{e:?}")).program;
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-routed-ice40");
+    let venv = tools(&board);
+    let models = board.family.models.as_ref().expect("models of the cells");
+    let options = build::Options { seed: 1, seeds: 1, time: None, netlist: true };
+    std::fs::create_dir_all(&folder).expect("the target folder can be written");
+    build::build(&venv, &board, &wiring, &servo, options, &folder, &|_| ()).unwrap_or_else(|e| panic!("{e}"));
+    let circuit = || {
+        let folder = folder.join("circuit");
+        Simulation::new(&board, &wiring, &servo, &folder).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let simulated = |change: &dyn Fn(&mut serde_json::Map<String, serde_json::Value>)| {
+        let files =
+            netlist::verilog(&venv, models, &folder, change).unwrap_or_else(|error| panic!("{error}"));
+        Simulation::of(&files, &board, &wiring, &folder.join("simulation")).unwrap_or_else(|e| panic!("{e}"))
+    };
+    assert_eq!(first_difference(circuit(), simulated(&|_| ())), None);
+    let faulty = simulated(&|cells| invert_a_table(cells, models, "u_motor"));
+    assert!(first_difference(circuit(), faulty).is_some(), "the planted fault was not noticed");
+}
+
+/// The first run of a drive by step and direction in which two boards' output pins differ. The motor turns as the PWM drives it.
+fn first_difference(mut one: Simulation, mut other: Simulation) -> Option<u32> {
+    let (mut position, mut drove) = (0, 0);
+    for run in 0..600 {
+        let high = one.output("motor_high").expect("a pin").1 as i32;
+        let low = one.output("motor_low").expect("a pin").1 as i32;
+        let moves = if high + low > 0 { (high - 600) / 40 } else { 0 };
+        for board in [&mut one, &mut other] {
+            let pins = ["encoder_a", "encoder_b"].map(|pin| board.input(pin).expect("a pin"));
+            board.turns = vec![EncoderMotion { pins, from: position, by: moves }];
+            board.set("wanted_direction", run % 200 < 120);
+            board.set("wanted_step", run % 2 == 0);
+            // The button is not pressed, but for a while.
+            board.set("button", !(300..310).contains(&run));
+            board.run(1200, &[]).expect("it runs");
+        }
+        position += moves;
+        let levels = |board: &Simulation| board.output_levels().collect::<Vec<_>>();
+        if run > 0 && levels(&one) != levels(&other) {
+            return Some(run);
+        }
+        drove += i32::from(moves != 0);
+    }
+    assert!(drove > 50, "the motor has turned in {drove} runs");
+    None
+}
+
+/// The tools' environment that `TAKT_VENV` names, or `.venv`, with the tools of a board.
+fn tools(board: &Board) -> Venv {
+    let folder = std::env::var_os("TAKT_VENV")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.venv"), PathBuf::from);
+    Venv::with(&folder, &build::packages(board).expect("tools")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Inverts a table of the logic of a part of the circuit.
+fn invert_a_table(cells: &mut serde_json::Map<String, serde_json::Value>, models: &Models, part: &str) {
+    let mut own = cells.iter_mut().filter(|(name, _)| name.contains(part)).map(|(_, cell)| cell);
+    let table = own.find_map(|cell| (models.truth_table)(cell)).expect("the part has logic");
+    let bits = table.as_str().expect("a table").chars();
+    let inverted: String = bits.map(|bit| if bit == '0' { '1' } else { '0' }).collect();
+    *table = inverted.into();
 }
 
 /// Tests everything that the board has to do, from power-up on.

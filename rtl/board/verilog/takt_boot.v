@@ -42,6 +42,10 @@ module takt_boot #(
 );
 
     localparam WIDTH = CORES > 1 ? 73 : 69;
+    // Bits of the counter of addresses and of cycles to settle; no memory has more than 2^16 words.
+    localparam WORDS = CODE > DATA ? CODE : DATA;
+    localparam MOST  = WORDS > INPUTS ? WORDS : INPUTS;
+    localparam COUNT = MOST > $clog2(SETTLE) ? MOST : $clog2(SETTLE);
     reg  [WIDTH-1:0] records [0:ROOM-1];
     initial $readmemh(IMAGE, records);
 
@@ -50,21 +54,22 @@ module takt_boot #(
     reg  [31:0]     low;
     reg  [15:0]     high;
     reg  [BITS:0]   next;
-    reg  [15:0]     clears;     // program words of each slot, then data, then input ports
+    reg  [COUNT-1:0] clears;    // program words of each slot, then data, then input ports
     reg  [2:0]      slot;
     reg  [1:0]      state;      // 0: at rest, 1: zeros, 2: records, 3: settles
     reg             fetches, valid, clearing, clears_data, clears_input;
-    reg  [15:0]     cleared;
+    reg  [COUNT-1:0] cleared;
     reg  [2:0]      cleared_slot;
 
     wire [BITS-1:0] read_at = state == 2'd0 ? at : next[BITS-1:0];
-    localparam [15:0] LAST_CODE = (1 << CODE) - 1;
-    localparam [15:0] LAST_DATA = (1 << DATA) - 1;
-    localparam [15:0] LAST_PORT = (1 << INPUTS) - 2;
-    localparam [15:0] LAST_SETTLE = SETTLE - 1;
+    localparam [COUNT-1:0] LAST_CODE = (1 << CODE) - 1;
+    localparam [COUNT-1:0] LAST_DATA = (1 << DATA) - 1;
+    localparam [COUNT-1:0] LAST_PORT = (1 << INPUTS) - 2;
+    localparam [COUNT-1:0] LAST_SETTLE = SETTLE - 1;
+    localparam [COUNT-1:0] ONE = 1;
     // Beyond the slots of program memory.
     localparam [2:0]  DATA_SLOT = SLOTS, PORT_SLOT = SLOTS + 1;
-    wire [15:0] last_clear = slot == PORT_SLOT ? LAST_PORT : slot == DATA_SLOT ? LAST_DATA : LAST_CODE;
+    wire [COUNT-1:0] last_clear = slot == PORT_SLOT ? LAST_PORT : slot == DATA_SLOT ? LAST_DATA : LAST_CODE;
 
     always @(posedge clk) begin
         fetched <= records[read_at];
@@ -97,7 +102,7 @@ module takt_boot #(
     assign input_write  = {CORES{clears_input}} | (mine & {CORES{valid & record[65:64] == 2'd3}});
     assign load_space   = clearing ? {1'b0, clears_data} : record[65:64];
     assign load_slot    = clearing ? cleared_slot : record[68:66];
-    assign load_address = clearing | clears_input ? cleared : record[63:48];
+    assign load_address = clearing | clears_input ? {{16-COUNT{1'b0}}, cleared} : record[63:48];
     assign load_value   = clearing | clears_input ? 48'd0 : record[47:0];
 
     always @(posedge clk) begin
@@ -110,9 +115,9 @@ module takt_boot #(
         cleared_slot <= slot == DATA_SLOT ? 3'd0 : slot;
         case (state)
             2'd1: begin
-                clears <= clears + 16'd1;
+                clears <= clears + ONE;
                 if (clears == last_clear) begin
-                    clears <= 16'd0;
+                    clears <= 0;
                     slot   <= slot + 3'd1;
                     if (slot == PORT_SLOT) state <= 2'd2;
                 end
@@ -122,7 +127,7 @@ module takt_boot #(
                 else next <= next + 1'b1;
             end
             2'd3: begin
-                clears <= clears + 16'd1;
+                clears <= clears + ONE;
                 if (clears == LAST_SETTLE) begin
                     state <= 2'd0;
                     reset <= 1'b0;
@@ -134,7 +139,7 @@ module takt_boot #(
             state   <= 2'd1;
             reset   <= 1'b1;
             next    <= 0;
-            clears  <= 16'd0;
+            clears  <= 0;
             slot    <= 3'd0;
         end
     end

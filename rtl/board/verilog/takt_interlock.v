@@ -29,33 +29,39 @@ module takt_interlock #(
     output reg  [31:0] misses
 );
 
-    localparam [15:0] MOST  = DEADLINES;
-    localparam [15:0] QUIET = HOST;
+    // Both counters are as wide as their limits.
+    localparam ROW   = $clog2(DEADLINES + 1);
+    localparam QUIETS = $clog2(HOST + 2);
+    localparam [ROW-1:0]    MOST  = DEADLINES, ONE_MORE = 1;
+    localparam [QUIETS-1:0] QUIET = HOST, ONE_LONGER = 1;
 
     initial drive = 1'b0;  // safe before the first clock edge, too
 
-    reg  [15:0] row, silence;
+    reg  [ROW-1:0]    row;
+    reg  [QUIETS-1:0] silence;
     reg         published;
-    wire        late  = missed & row + 16'd1 == MOST;
+    wire [ROW-1:0] in_row = row + ONE_MORE;
+    wire        late  = missed & in_row == MOST;
     wire        alone = HOST != 0 & silence == QUIET & ~heard;
     wire [5:0]  now   = {nan, stop, alone, late, halted, fault};
 
     always @(posedge clk) begin
         if (missed) begin
-            row    <= row + 16'd1;
+            row    <= in_row;
             misses <= misses + 32'd1;
         end
         if (done) begin
-            row       <= 16'd0;
+            row       <= 0;
             published <= 1'b1;
         end
-        if (heard) silence <= 16'd0;
-        else if (ticks & silence != QUIET) silence <= silence + 16'd1;
+        if (heard) silence <= 0;
+        else if (ticks & silence != QUIET) silence <= silence + ONE_LONGER;
         cause <= cause | now;
         drive <= enable & published & ~|cause & ~|now;
         if (rst) begin
             {drive, published, cause} <= 8'd0;
-            {row, silence} <= 32'd0;
+            row     <= 0;
+            silence <= 0;
             misses <= 32'd0;
         end
     end

@@ -7,7 +7,9 @@
 //   left: cycles until the next tick. A new period or lead counts from the next tick on.
 //   While run is 0 nothing happens.
 
-module takt_tick (
+module takt_tick #(
+    parameter BITS = 32       // of period, and of lead + 2
+) (
     input  wire        clk,
     input  wire        rst,
     input  wire        run,
@@ -15,25 +17,27 @@ module takt_tick (
     input  wire [31:0] lead,
     output reg         tick,
     output reg         early,
-    output reg  [31:0] left
+    output wire [31:0] left
 );
 
-    reg  [31:0] ahead;
-    reg         runs;
-    wire        last  = left == 32'd1;
-    wire        valid = period >= 32'd2;
-    wire [31:0] used  = lead < period ? lead : 32'd0;
+    localparam [BITS-1:0] ONE = 1;
+    reg  [BITS-1:0] ahead, count;
+    reg             runs;
+    assign left = {{32-BITS{1'b0}}, count};
+    wire            last  = count == ONE;
+    wire            valid = period >= 32'd2;
+    wire [31:0]     used  = lead < period ? lead : 32'd0;
 
     always @(posedge clk) begin
         tick  <= runs & last;
-        early <= runs & (ahead == 32'd0 ? last : left == ahead + 32'd1);
-        if (~runs | last) ahead <= used;
-        if (~runs) left <= used + 32'd1;
-        else left <= last ? period : left - 32'd1;
+        early <= runs & (ahead == 0 ? last : count == ahead + ONE);
+        if (~runs | last) ahead <= used[BITS-1:0];
+        if (~runs) count <= used[BITS-1:0] + ONE;
+        else count <= last ? period[BITS-1:0] : count - ONE;
         runs <= run & valid;
         if (rst) begin
             {tick, early, runs} <= 3'd0;
-            left <= 32'd0;
+            count <= 0;
         end
     end
 

@@ -122,6 +122,7 @@ pub static FAMILIES: &[&Family] = &[
     &ecp5::FAMILY,
     &gowin::FAMILY,
     &gowin::arora_v::FAMILY,
+    &gowin::little_bee::FAMILY,
     &ice40::FAMILY,
     &gatemate::FAMILY,
     &nexus::FAMILY,

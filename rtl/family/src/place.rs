@@ -69,8 +69,8 @@ pub struct Pack {
 /// Models of a family's cells in Verilog.
 #[derive(Clone, Copy, Debug)]
 pub struct Models {
-    /// Models of the cells for which yosys' library has no behaviour.
-    pub cells: File,
+    /// Models of the cells for which yosys' library has no behaviour; `None` if it has all.
+    pub cells: Option<File>,
     /// Files of yosys' library that a routed netlist needs.
     pub library: &'static [YosysFile],
     /// Adapts the cells of a routed netlist to the models.

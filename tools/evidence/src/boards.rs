@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The command `cargo evidence boards`: builds of a program with an encoder and a PWM on the boards, each as `takt board build` makes it,
+//! The command `cargo evidence boards`: builds of programs with an encoder and a PWM on the boards, each as `takt board build` makes it,
 //! recorded in `rtl/boards.json` and in a table of docs/board.md.
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -14,15 +14,21 @@ use takt_automation::venv::Venv;
 use takt_board::build::{self, BuildError};
 use takt_board::{Board, Wiring};
 use takt_family::Resources;
+use takt_isa::Program;
 use takt_isa::spec::machines::MACHINES;
-use takt_isa::{Machine, Program};
 
 /// File of the builds.
 const RECORD: &str = "rtl/boards.json";
 /// Document with the table of the builds.
 pub(crate) const DOCUMENT: &str = "docs/board.md";
-/// Program of every build.
+/// Program of the builds with Takt's own machines.
 const PROGRAM: &str = "programs/examples/board/position.s";
+/// Folder of the program for small devices, [`SMALL_PROGRAM`], with its machine, [`SMALL_MACHINE`]; its board has no UART.
+const SMALL_FOLDER: &str = "programs/examples/board/step";
+const SMALL_PROGRAM: &str = "servo.s";
+const SMALL_MACHINE: &str = "machine.toml";
+/// Name of that machine.
+const SMALL: &str = "small";
 
 /// A build: board, machine, clock in MHz.
 struct Design {
@@ -36,7 +42,7 @@ const fn design(board: &'static str, machine: &'static str, clock: f64) -> Desig
 }
 
 /// The builds of the table, those of a family after one another.
-const DESIGNS: [Design; 16] = [
+const DESIGNS: [Design; 20] = [
     design("ulx3s-85f", "t1", 75.0),
     design("ulx3s-85f", "t3", 75.0),
     design("ulx3s-45f", "t1", 75.0),
@@ -49,10 +55,14 @@ const DESIGNS: [Design; 16] = [
     design("tang-primer-20k", "t1", 54.0),
     design("tang-nano-20k", "t1", 54.0),
     design("tang-primer-25k", "t1", 50.0),
+    design("tang-nano-9k", "t1", 27.0),
+    design("tang-nano-9k", SMALL, 27.0),
     design("gatemate-evb", "t1", 20.0),
+    design("gatemate-evb", SMALL, 20.0),
     design("olimex-gatemate", "t1", 20.0),
     design("crosslink-nx-evn", "t1", 12.0),
     design("icebreaker", "t1", 12.0),
+    design("icebreaker", SMALL, 24.0),
 ];
 
 /// The builds to make.
@@ -152,9 +162,22 @@ fn board(name: &str) -> Result<Board> {
     Board::from_name(name).with_context(|| format!("there is no board `{name}`"))?.map_err(wrong)
 }
 
-/// An encoder and a PWM at the first pins of a board.
-fn wiring(board: &Board, clock: f64) -> Result<Wiring> {
-    let [a, b, high, low, ..] = &board.pins[..] else { bail!("{} has fewer than four pins", board.name) };
+/// An encoder and a PWM at the first pins of a board; for the small machine also step and direction, in place of a host.
+fn wiring(board: &Board, design: &Design) -> Result<Wiring> {
+    let [a, b, high, low, step, direction, ..] = &board.pins[..] else {
+        bail!("{} has fewer than six pins", board.name)
+    };
+    let clock = design.clock;
+    if design.machine == SMALL {
+        let text = format!(
+            "board = \"{}\"\nclock = {clock}\nperiod = 500\nautostart = true\nuart = false\n\
+             [peripheral.encoder]\nkind = \"quadrature\"\npins = {{ a = \"{}\", b = \"{}\" }}\nports = {{ count = \"n\" }}\n\
+             [peripheral.wanted]\nkind = \"step\"\npins = {{ step = \"{}\", direction = \"{}\" }}\nports = {{ count = \"steps\" }}\n\
+             [peripheral.motor]\nkind = \"pwm\"\npins = {{ high = \"{}\", low = \"{}\" }}\nhalf = 600\ndead = 12\nports = {{ duty = \"duty\" }}\n",
+            board.name, a.0, b.0, step.0, direction.0, high.0, low.0
+        );
+        return Wiring::read("wiring.toml", &text, board).map_err(wrong);
+    }
     let text = format!(
         "board = \"{}\"\nclock = {clock}\nperiod = 100\nautostart = true\n\
          [peripheral.encoder]\nkind = \"quadrature\"\npins = {{ a = \"{}\", b = \"{}\" }}\nports = {{ count = \"n\" }}\n\
@@ -164,22 +187,32 @@ fn wiring(board: &Board, clock: f64) -> Result<Wiring> {
     Wiring::read("wiring.toml", &text, board).map_err(wrong)
 }
 
-fn program(machine: &'static Machine) -> Result<Program> {
-    let path = root().join(PROGRAM);
-    let text = fs::read_to_string(&path).with_context(|| format!("cannot read {PROGRAM}"))?;
-    let loader = MemoryLoader::new(&[("position.s", text.as_str())]);
-    let options = Options { machine, ..Options::default() };
-    Ok(assemble("position.s", &loader, &options)
-        .map_err(|errors| anyhow!("{}", errors.render(false)))?
-        .program)
+/// Program of the builds with a machine.
+fn program(machine: &str) -> Result<Program> {
+    let read =
+        |file: &str| fs::read_to_string(root().join(file)).with_context(|| format!("cannot read {file}"));
+    if machine == SMALL {
+        let [source, row] =
+            [SMALL_PROGRAM, SMALL_MACHINE].map(|name| read(&format!("{SMALL_FOLDER}/{name}")));
+        let (source, row) = (source?, row?);
+        let files = [(SMALL_PROGRAM, source.as_str()), (SMALL_MACHINE, row.as_str())];
+        return assembled(SMALL_PROGRAM, &files, &Options::default());
+    }
+    let known = MACHINES.iter().copied().find(|known| known.name == machine);
+    let machine = known.with_context(|| format!("there is no machine `{machine}`"))?;
+    assembled("position.s", &[("position.s", &read(PROGRAM)?)], &Options { machine, ..Options::default() })
+}
+
+fn assembled(name: &str, files: &[(&str, &str)], options: &Options) -> Result<Program> {
+    let result = assemble(name, &MemoryLoader::new(files), options);
+    Ok(result.map_err(|errors| anyhow!("{}", errors.render(false)))?.program)
 }
 
 /// Builds a design in `target/boards`.
 fn built(design: &Design, seeds: u32) -> Result<Build> {
     let board = board(design.board)?;
-    let machine = MACHINES.iter().copied().find(|machine| machine.name == design.machine);
-    let program = program(machine.with_context(|| format!("there is no machine `{}`", design.machine))?)?;
-    let wiring = wiring(&board, design.clock)?;
+    let program = program(design.machine)?;
+    let wiring = wiring(&board, design)?;
     let packages = build::packages(&board)?;
     let venv = Venv::with(&packages)?;
     let folder = root().join("target/boards").join(format!("{}-{}", design.board, design.machine));
@@ -260,7 +293,8 @@ fn line(row: &Build) -> Result<String> {
 pub(crate) fn table() -> Result<String> {
     let rows = recorded()?;
     let mut text = format!(
-        "`{PROGRAM}` with an encoder and a PWM at the first pins of each board, built by `cargo evidence boards`. LUTs, flip-flops, multipliers
+        "`{PROGRAM}` with an encoder and a PWM at the first pins of each board, built by `cargo evidence boards`; the machine `{SMALL}` with
+`{SMALL_FOLDER}/{SMALL_PROGRAM}`, which has step and direction in place of a host. LUTs, flip-flops, multipliers
 and block RAMs are the device's own, as yosys or nextpnr count them; the clock is in MHz.
 
 | board | device and grade | machine | LUTs | flip-flops | multipliers | block RAMs | clock | reached | bitstream | simulated as | date |

@@ -69,7 +69,7 @@ pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
     let cells = mapped(&folder.join("mapped.json"), top, family)?;
     let (table, text) = models.mapped_table;
     fs::write(folder.join(table), text)?;
-    fs::write(folder.join("cells.v"), format!("{WAIVER}{}", models.cells.1))?;
+    fs::write(folder.join("cells.v"), format!("{WAIVER}{}", models.cells.map_or("", |(_, text)| text)))?;
     let library: String = models.mapped_library.iter().map(|path| format!(" +/{path}")).collect();
     let back = format!(
         "read_json top.json\ntechmap -map {table}\nread_verilog{library}\n\

@@ -61,7 +61,7 @@ pub fn circuit<'a>(
     application: impl Into<Application<'a>>,
 ) -> Result<Circuit, TopError> {
     let (application, library) = (application.into(), Library::builtin());
-    let contents = image(application.clone())?;
+    let contents = contents(wiring, &application)?;
     let left = memory::check(board, wiring, &application, &contents, &library)?;
     let scope = ScopeSize::of(board, wiring, &application, left)?;
     let mut design = Design::of(&application, &library)?;
@@ -109,11 +109,20 @@ pub fn scope<'a>(
     application: impl Into<Application<'a>>,
 ) -> Result<Option<ScopeSize>, TopError> {
     let (application, library) = (application.into(), Library::builtin());
-    let left = memory::check(board, wiring, &application, &image(application.clone())?, &library)?;
+    let left = memory::check(board, wiring, &application, &contents(wiring, &application)?, &library)?;
     ScopeSize::of(board, wiring, &application, left)
 }
 
-/// The files of carriers, filters and trips that a wiring does not need.
+/// The image on a board with this wiring: without a host that writes others, it has no room beyond its records.
+fn contents(wiring: &Wiring, application: &Application<'_>) -> Result<Contents, TopError> {
+    let mut contents = image(application.clone())?;
+    if !wiring.uart {
+        contents.room = contents.records.len().next_power_of_two();
+    }
+    Ok(contents)
+}
+
+/// The files of the host's UART, carriers, filters and trips that a wiring does not need.
 fn unused(wiring: &Wiring) -> Vec<&'static str> {
     let has = |strobe: fn(&Strobes) -> bool| {
         wiring.peripherals.iter().any(|peripheral| strobe(&peripheral.kind.strobes))
@@ -124,6 +133,9 @@ fn unused(wiring: &Wiring) -> Vec<&'static str> {
         ("takt_pwm3.v", has(|strobes| strobes.carrier)),
         ("takt_pwm_phase.v", has(|strobes| strobes.carrier)),
         ("takt_sinc3.v", has(|strobes| strobes.window)),
+        ("takt_bridge.v", wiring.uart),
+        ("takt_uart_receive.v", wiring.uart),
+        ("takt_uart_send.v", wiring.uart),
         ("takt_scope.v", wiring.scope.is_some()),
         ("takt_trip.v", has(|strobes| strobes.trips)),
     ];

@@ -32,6 +32,7 @@ pub(super) fn section(
         let _ = writeln!(writable, "            16'd{at}: writable <= 1'b0;");
     }
     let (mut outputs, mut settings, mut taken) = (String::new(), String::new(), String::new());
+    let has_floats = connected.sinks[0].iter().any(|sink| sink.written.scale.is_some());
     for (n, sink) in connected.sinks[0].iter().enumerate() {
         let (float, exponent) = scale(sink.written);
         let _ = writeln!(outputs, "            8'd{n}: out_index <= {port_bits}'d{};", sink.number);
@@ -56,6 +57,10 @@ pub(super) fn section(
         ("PORT_BITS", port_bits.to_string()),
         ("PORT_HIGH", (port_bits - 1).to_string()),
         ("OUTPUTS", outputs),
+        (
+            "TAKEN",
+            if has_floats { include_str!("scaled.v.in") } else { include_str!("plain.v.in") }.to_owned(),
+        ),
         ("SETTINGS", settings),
         ("SINKS", taken),
         ("FTOI", to_integer(library)),

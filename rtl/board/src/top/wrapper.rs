@@ -30,10 +30,11 @@ pub(super) fn wrapper(
     library: &Library,
 ) -> String {
     let connected = PeripheralConnections::new(application, wiring);
-    let mut all = match &design.plan {
+    let mut all = host(wiring);
+    all.extend(match &design.plan {
         None => ports::section(&connected, &design.top, wiring, library),
         Some(plan) => links::section(plan, &connected, wiring, &ports::to_integer(library)),
-    };
+    });
     all.extend(connected.instances(wiring));
     all.extend(carriers(wiring));
     all.extend(pins(wiring));
@@ -46,6 +47,26 @@ pub(super) fn wrapper(
     protocol::REGISTERS.iter().fold(text, |text, register| {
         text.replace(&format!("@A_{}@", register.name.to_uppercase()), &register.address.to_string())
     })
+}
+
+/// The host's UART with its bridge to the registers; without a UART, nets at rest, from which synthesis removes the registers.
+fn host(wiring: &Wiring) -> Values {
+    let (bridge, pins, unused) = if wiring.uart {
+        let pins = ",\n    input  wire uart_receive,\n    output wire uart_send";
+        (include_str!("host.v.in"), pins, "")
+    } else {
+        (include_str!("alone.v.in"), "", ", bus_read, writable, grant, stream_due")
+    };
+    // Without a host, nobody changes period and lead.
+    let tick_bits =
+        if wiring.uart { 32 } else { u32::BITS - wiring.period.max(wiring.lead + 2).leading_zeros() };
+    vec![
+        ("TICK_BITS", tick_bits.to_string()),
+        ("HOST", bridge.to_owned()),
+        ("UART", pins.to_owned()),
+        ("UNUSED", unused.to_owned()),
+        ("DIVIDE", (wiring.clock * 1e6 / f64::from(wiring.baud)).round().to_string()),
+    ]
 }
 
 /// The values for pins, parameters of the wiring, and addresses of the protocol.
@@ -70,7 +91,6 @@ fn pins(wiring: &Wiring) -> Values {
     };
     vec![
         ("NAME", AROUND.to_owned()),
-        ("DIVIDE", (wiring.clock * 1e6 / f64::from(wiring.baud)).round().to_string()),
         ("PINS", pins),
         ("START", u8::from(wiring.autostart).to_string()),
         ("PERIOD", wiring.period.to_string()),

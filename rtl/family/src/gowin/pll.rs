@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! PLL cells rPLL of GW2A and PLLA of GW5A: dividers and instances.
+//! PLL cells rPLL of GW1N and GW2A, and PLLA of GW5A: dividers and instances.
 
 use crate::PllError;
 use crate::pll::exact;
@@ -15,10 +15,24 @@ struct Dividers {
     outputs: u32,
 }
 
-/// Limits of Gowin's data sheet DS102 for grade C8: phase detector, oscillator and output, in MHz.
-const DETECTOR: (f64, f64) = (3.0, 500.0);
-const OSCILLATOR: (f64, f64) = (500.0, 1250.0);
-const OUTPUT: (f64, f64) = (3.90625, 625.0);
+/// Device with a cell rPLL.
+struct Rpll {
+    /// Parameter DEVICE.
+    device: &'static str,
+    /// Lowest and highest frequencies of phase detector, oscillator and output, in MHz.
+    detector: (f64, f64),
+    oscillator: (f64, f64),
+    output: (f64, f64),
+}
+
+/// Limits of Gowin's data sheet DS102 for grade C8.
+const GW2A: Rpll =
+    Rpll { device: "GW2A-18", detector: (3.0, 500.0), oscillator: (500.0, 1250.0), output: (3.90625, 625.0) };
+
+/// Limits of Gowin's data sheet DS117 for grade C6.
+const GW1N: Rpll =
+    Rpll { device: "GW1NR-9C", detector: (3.0, 400.0), oscillator: (400.0, 1200.0), output: (3.125, 600.0) };
+
 /// Values of the divider of the oscillator.
 const OUTPUTS: [u32; 11] = [2, 4, 8, 16, 32, 48, 64, 80, 96, 112, 128];
 
@@ -31,29 +45,40 @@ impl Dividers {
     ///
     /// # Errors
     /// The nearest possible clocks, if no dividers make this one.
-    fn new(input: f64, wanted: f64) -> Result<Dividers, PllError> {
+    fn new(of: &Rpll, input: f64, wanted: f64) -> Result<Dividers, PllError> {
+        let middle = f64::midpoint(of.oscillator.0, of.oscillator.1);
         let all = (1..=64_u32).flat_map(|reference| (1..=64_u32).map(move |feedback| (reference, feedback)));
         let settings = all.filter_map(|(reference, feedback)| {
             let detector = input / f64::from(reference);
             let output = detector * f64::from(feedback);
             // Place the oscillator near the middle of its range.
-            let distance = |outputs: &u32| (f64::from(*outputs) * output - 875.0).abs();
+            let distance = |outputs: &u32| (f64::from(*outputs) * output - middle).abs();
             let possible =
-                OUTPUTS.into_iter().filter(|&outputs| within(OSCILLATOR, f64::from(outputs) * output));
+                OUTPUTS.into_iter().filter(|&outputs| within(of.oscillator, f64::from(outputs) * output));
             let outputs = possible.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-            (within(DETECTOR, detector) && within(OUTPUT, output))
+            (within(of.detector, detector) && within(of.output, output))
                 .then_some((output, Dividers { reference, feedback, outputs }))
         });
         exact(input, wanted, settings)
     }
 }
 
-/// Instance of rPLL, for frequencies in MHz.
-pub(super) fn instance(input: f64, wanted: f64) -> Result<String, PllError> {
-    let Dividers { reference, feedback, outputs } = Dividers::new(input, wanted)?;
+/// Instance of rPLL in GW2A, for frequencies in MHz.
+pub(super) fn gw2a(input: f64, wanted: f64) -> Result<String, PllError> {
+    rpll(&GW2A, input, wanted)
+}
+
+/// Instance of rPLL in GW1N, for frequencies in MHz.
+pub(super) fn gw1n(input: f64, wanted: f64) -> Result<String, PllError> {
+    rpll(&GW1N, input, wanted)
+}
+
+fn rpll(of: &Rpll, input: f64, wanted: f64) -> Result<String, PllError> {
+    let Dividers { reference, feedback, outputs } = Dividers::new(of, input, wanted)?;
+    let device = of.device;
     Ok(format!(
         "    rPLL #(
-        .DEVICE(\"GW2A-18\"), .FCLKIN(\"{input}\"), .IDIV_SEL({}), .FBDIV_SEL({}), .ODIV_SEL({outputs}),
+        .DEVICE(\"{device}\"), .FCLKIN(\"{input}\"), .IDIV_SEL({}), .FBDIV_SEL({}), .ODIV_SEL({outputs}),
         .DYN_IDIV_SEL(\"false\"), .DYN_FBDIV_SEL(\"false\"), .DYN_ODIV_SEL(\"false\"), .CLKFB_SEL(\"internal\")
     ) pll (
         .CLKIN(clk_in), .CLKOUT(clk), .LOCK(locked), .CLKOUTP(), .CLKOUTD(), .CLKOUTD3(), .CLKFB(1'b0), .RESET(1'b0),
@@ -131,10 +156,15 @@ mod tests {
     #[test]
     fn dividers_equal_gowin_plls() {
         // gowin_pll -i 27 -o 108 -d "GW2A-18 C8/I7", with dividers of the oscillator that the range allows.
-        assert_eq!(Dividers::new(27.0, 108.0), Ok(Dividers { reference: 1, feedback: 4, outputs: 8 }));
-        assert_eq!(Dividers::new(27.0, 81.0), Ok(Dividers { reference: 1, feedback: 3, outputs: 8 }));
-        assert_eq!(Dividers::new(27.0, 60.0), Ok(Dividers { reference: 9, feedback: 20, outputs: 16 }));
-        let error = Dividers::new(27.0, 100.0).expect_err("none").to_string();
+        assert_eq!(Dividers::new(&GW2A, 27.0, 108.0), Ok(Dividers { reference: 1, feedback: 4, outputs: 8 }));
+        assert_eq!(Dividers::new(&GW2A, 27.0, 81.0), Ok(Dividers { reference: 1, feedback: 3, outputs: 8 }));
+        assert_eq!(
+            Dividers::new(&GW2A, 27.0, 60.0),
+            Ok(Dividers { reference: 9, feedback: 20, outputs: 16 })
+        );
+        let error = Dividers::new(&GW2A, 27.0, 100.0).expect_err("none").to_string();
+        // gowin_pll -i 27 -o 54 -d "GW1NR-9C C6/I5".
+        assert_eq!(Dividers::new(&GW1N, 27.0, 54.0), Ok(Dividers { reference: 1, feedback: 2, outputs: 16 }));
         assert_eq!(error, "the PLL cannot make 100 MHz from 27; the nearest are 99 and 100.2857");
     }
 

@@ -183,6 +183,18 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
         outputs.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
     files::check(&reads, &writes)?;
     let (board, wiring, carried) = arguments.target.read(color, true)?;
+    if !wiring.uart {
+        let talks = [
+            ("--plant", arguments.plant.is_some()),
+            ("--robot", arguments.robot),
+            ("--noise", arguments.noise > 0),
+        ];
+        if let Some((option, _)) = talks.into_iter().find(|(_, is_given)| *is_given) {
+            bail!(
+                "{option} is for a board with a UART, which the wiring leaves out (`uart = false`); --axis, --script and --inputs drive its pins"
+            );
+        }
+    }
     // Check the drivers of the pins before the circuit is compiled.
     let taken: Vec<&str> = arguments.axis.iter().filter_map(|text| text.split(',').nth(1)).collect();
     let mut pins = pins::Pins::new(&board, &wiring, &taken);
@@ -302,6 +314,9 @@ fn serve_robot(
 /// Reports at the end of a simulation why the outputs are safe, if they are.
 #[cfg(unix)]
 fn report_safe_outputs(mut sim: Simulation, wiring: &Wiring, carried: &Application) -> Result<()> {
+    if !wiring.uart {
+        return Ok(());
+    }
     // No external host is connected any more, so disturbing the requests serves no purpose.
     sim.noise = 0;
     sim.unplugged = false;
@@ -350,10 +365,18 @@ fn serve(
     let mut axes = axes.collect::<Result<Vec<Axis>>>()?;
     // Pulses are measured over complete PWM periods.
     let whole = axes.iter().map(|axis| 2 * axis.half as u32).max();
-    let mut terminal = takt_board::terminal::Terminal::new()?;
-    writeln!(out, "{} {}", terminal.path().display(), wiring.baud)?;
-    out.flush()?;
-    next_commands(Some(&arguments.target.program), terminal.path(), wiring.baud);
+    let mut terminal = match wiring.uart {
+        true => Some(takt_board::terminal::Terminal::new()?),
+        false => None,
+    };
+    match &terminal {
+        Some(terminal) => {
+            writeln!(out, "{} {}", terminal.path().display(), wiring.baud)?;
+            out.flush()?;
+            next_commands(Some(&arguments.target.program), terminal.path(), wiring.baud);
+        }
+        None => output::message("the board has no UART; Ctrl-C ends the simulation"),
+    }
     while arguments.cycles.is_none_or(|most| sim.cycles < most) {
         let mut slice = whole.unwrap_or(SLICE);
         if let Some(script) = &mut script {
@@ -364,13 +387,16 @@ fn serve(
                 slice = script.at_most(sim.cycles, slice);
             }
         }
-        let bytes = terminal.receive()?;
+        let bytes = match &mut terminal {
+            Some(terminal) => terminal.receive()?,
+            None => Vec::new(),
+        };
         for axis in &mut axes {
             axis.moves(&mut sim, slice);
         }
         sim.run(slice, &bytes)?;
         let received = sim.take_received();
-        if !received.is_empty() {
+        if let Some(terminal) = terminal.as_mut().filter(|_| !received.is_empty()) {
             terminal.send(&received)?;
         }
     }
