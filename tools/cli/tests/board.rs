@@ -49,6 +49,30 @@ fn the_example_fits_its_board_and_a_circuit_is_written() {
     assert!(pins.contains("LOCATE COMP \"encoder_a\" SITE \"B11\";"), "{pins}");
 }
 
+/// A servo by step and direction follows its steps on a board without a host, of which the command expects no answer.
+#[test]
+fn a_board_without_a_host_follows_steps() {
+    let folder = Folder::new();
+    let (wiring, servo) = (example("step/icebreaker.toml"), example("step/servo.s"));
+    let steps =
+        "set wanted.direction=1 wanted.step=1\nwait 0.05ms\nset wanted.step=0\nwait 0.05ms\n".repeat(120);
+    folder.write("steps", format!("wait 1ms\n{steps}wait 40ms\nquit\n"));
+    let sim = format!("board sim --wiring {wiring} --program {servo}");
+    let run = folder.line(&format!("{sim} --axis motor,encoder,20000 --script steps"));
+    assert!(run.status == Some(0) && run.stderr.contains("the board has no UART"), "{run:?}");
+    let said = run.stdout;
+    let counts = said.trim().strip_prefix("motor: ").and_then(|said| said.strip_suffix(" counts"));
+    let counts: i32 = counts.and_then(|counts| counts.parse().ok()).unwrap_or_else(|| panic!("{said}"));
+    assert!((115..=125).contains(&counts), "{counts}");
+    for (line, says) in [
+        (format!("{sim} --noise 3"), "--noise is for a board with a UART"),
+        (format!("fmu {servo} --circuit --wiring {wiring} -o board.fmu"), "`uart = false`"),
+    ] {
+        let refused = folder.line(&line);
+        assert!(refused.status == Some(1) && refused.stderr.contains(says), "{refused:?}");
+    }
+}
+
 /// A program that always misses its tick is an error that states the figures; `takt-board` tests other checks of numbers.
 #[test]
 fn a_program_that_is_always_late_is_refused() {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Gowin GW1N, the family for small designs, called LittleBee.
 
-use super::{BLOCK_RAMS, CARRY, FILES, LUTS, MARGIN, MULTIPLIERS, PACK, PACKAGE, PINOUT, SUFFIXES, commands, pll};
+use super::{
+    BLOCK_RAMS, CARRY, FILES, LUTS, MARGIN, MULTIPLIERS, PACK, PACKAGE, PINOUT, SUFFIXES, commands, pll,
+};
 use crate::{
     Cells, Family, MeasurementDevice, Oscillator, Pack, Part, Pinout, Place, Pll, ROUTED, Synthesis, room,
 };

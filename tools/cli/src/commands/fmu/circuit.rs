@@ -118,6 +118,10 @@ fn model(
     program: Option<&Program>,
     folder: &Path,
 ) -> Result<Model> {
+    ensure!(
+        wiring.uart,
+        "an FMU's master starts the program over the UART, which the wiring leaves out (`uart = false`)"
+    );
     let _waiting = DelayedActivity::new(format!("compiling the circuit for {}", board.name));
     let packed = Packed::new(board, wiring, application.clone(), folder)?;
     let ports = program.map_or(Vec::new(), |program| ports(wiring, program));
