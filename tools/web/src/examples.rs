@@ -27,6 +27,9 @@ const SHORT: [(&str, &str); 12] = [
 ];
 /// Examples whose periods are problems of their own: no line joins the points of a plot.
 const POINTS: [&str; 1] = ["lu.s"];
+/// Examples that solve `A·x = b` in each period, whose residual is plotted first: names of the matrix, the solution, the right-hand side, and
+/// of the output that is 1 where there is no solution.
+const RESIDUAL_OF: [(&str, [&str; 4]); 1] = [("lu.s", ["A", "x", "b", "singular"])];
 /// Number of periods in which an example without a table shows what it does.
 const PERIODS_OF: [(&str, usize); 6] = [
     ("blink.s", 2000),
@@ -86,6 +89,7 @@ pub(crate) fn about() -> Value {
         |name: &str| SECONDS_OF.iter().find(|(known, _)| *known == name).map(|(_, seconds)| seconds);
     let plant = |name: &str| PLANT_OF.iter().find(|(known, _)| *known == name).map(|(_, plant)| *plant);
     let short = |name: &str| SHORT.iter().find(|(known, _)| *known == name).map(|(_, title)| *title);
+    let residual = |name: &str| RESIDUAL_OF.iter().find(|(known, _)| *known == name).map(|(_, ports)| *ports);
     let plotted = |name: &str| PLOTTED_OF.iter().find(|(known, _)| *known == name).map(|(_, ports)| *ports);
     let example = |name: &str| {
         let source = text(name)?;
@@ -94,7 +98,7 @@ pub(crate) fn about() -> Value {
         let inputs = if plant.is_some() { None } else { text(&name.replace(".s", ".csv")) };
         let periods = PERIODS_OF.iter().find(|(known, _)| *known == name).map(|(_, periods)| periods);
         Some(
-            json!({ "name": name, "title": title(source), "short": short(name), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "plant": plant.map(|plant| json!({ "name": plant })), "plotted": plotted(name), "points": POINTS.contains(&name), "track": false }),
+            json!({ "name": name, "title": title(source), "short": short(name), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "plant": plant.map(|plant| json!({ "name": plant })), "plotted": plotted(name), "points": POINTS.contains(&name), "residual": residual(name), "track": false }),
         )
     };
     let mut examples: Vec<Value> = FIRST.into_iter().chain(rest).filter_map(example).collect();

@@ -479,7 +479,8 @@ export class Editor {
     const markers = exists(line) ? RangeSet.of(arrow.range(doc.line(line).from)) : RangeSet.empty;
     const effects = [setPlace.of({ lines: Decoration.set(lines, true), markers })];
     this.view.dispatch({ effects });
-    if (!exists(line)) return;
+    // Until somebody steps, the text is to be read from its beginning.
+    if (!exists(line) || !document.body.classList.contains("steps")) return;
     // Only the editor scrolls: on a telephone, the page stays at the picture above.
     const { scrollDOM } = this.view, block = this.view.lineBlockAt(doc.line(line).from), { scrollTop, clientHeight } = scrollDOM;
     if (block.top < scrollTop + MARGIN) scrollDOM.scrollTop = block.top - MARGIN;

@@ -585,10 +585,10 @@ async function showAhead(wanted, isOver) {
   }
 }
 
-/** A program with what the page knows: whether there is a table, the ports that are plotted first, and whether their values are single points. */
+/** A program with what the page knows: whether there is a table, the ports that are plotted first, and whether their values are single points or have a residual. */
 function known(program, wanted) {
-  const { plotted, points } = state.about.examples.find(({ name }) => name === wanted.name) ?? {};
-  return Object.assign(program, { blank: !wanted.inputs.trim(), plotted, points });
+  const { plotted, points, residual } = state.about.examples.find(({ name }) => name === wanted.name) ?? {};
+  return Object.assign(program, { blank: !wanted.inputs.trim(), plotted, points, residual });
 }
 
 /** Shows the build's diagram, if it is of the period that is asked for. */

@@ -247,6 +247,13 @@ function arrays(facts) {
   return [...found].map(([array, keys]) => [keys.length > 1 ? array : facts.get(keys[0]).name, keys]);
 }
 
+/** Largest component of `A·x - b` in each period; `null` where the program says that there is no solution. `ports`: names of `A`, `x`, `b`, and of that output. */
+function residual({ inputs, outputs, cycles }, [matrix, solution, right, none]) {
+  const size = Object.keys(outputs).filter((name) => name.startsWith(solution)).length, all = Array.from({ length: size }, (_, i) => i + 1);
+  const row = (period) => (i) => Math.abs(all.reduce((sum, j) => sum + inputs[`${matrix}${i}${j}`][period] * outputs[`${solution}${j}`][period], 0) - inputs[`${right}${i}`][period]);
+  return cycles.map((_, period) => (outputs[none][period] ? null : Math.max(...all.map(row(period)))));
+}
+
 /** Values of input ports that nobody gives. */
 const rest = ({ resting }) => ["0", ...Object.entries(resting).map(([name, value]) => `${name} ${short(value)} (of its .range nearest to 0)`)].join(", but ");
 
@@ -381,7 +388,8 @@ export class Plots {
     say(this.silence());
     if (before) this.parent.append(Object.assign(document.createElement("p"), { className: "ghost", textContent: `pale: before, with ${before.differs}` }));
     const cycles = [{ name: "cycles", values: run.cycles, stepped: true, ...(before && { before: before.cycles }) }];
-    const all = [...this.groups().map((curves) => ({ curves })), { curves: cycles, lines: this.levels() }];
+    const checks = program.residual && run.inputs[`${program.residual[0]}11`] ? [{ curves: [{ name: "largest |A·x − b|", points: true, values: residual(run, program.residual) }] }] : [];
+    const all = [...checks, ...this.groups().map((curves) => ({ curves })), { curves: cycles, lines: this.levels() }];
     const { label, ...common } = this.abscissa(), open = all.filter(({ curves }) => !isFlat(curves)), last = open.at(-1);
     const height = () => this.height(open.length, all.length - open.length);
     const { from, changes, picked } = this.mark ?? { changes: [] }, moments = [...new Set([...changes.map(({ period }) => period), ...(from > 1 ? [from] : [])])].map((period) => period - 1);
