@@ -130,6 +130,8 @@ async function light() {
   if (!el("machine-box").open || state.tab !== "step" || !state.program?.view || state.ahead) return;
   const { MachinePicture } = await import("./machine.js");
   picture ??= new MachinePicture(el("machine-picture"));
+  // The machine may have been stopped while the panel was loaded.
+  if (state.stale) return;
   try {
     const activity = await machine.call("activity");
     picture.show(activity.machine, activity);

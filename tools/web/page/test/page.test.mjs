@@ -466,6 +466,7 @@ test("a mistake leaves the curves where they are, and no figure of the text befo
   assert.match(await page.evaluate(() => getComputedStyle(document.getElementById("cycles"), "::after").content), /of the text before/);
   await page.keyboard.press("Control+Enter");
   await page.waitForFunction(() => !document.body.classList.contains("stale"));
+  await done(page);
   assert.deepEqual(await shown(), before);
   assert.deepEqual(errors, []);
 });
