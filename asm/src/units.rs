@@ -3,6 +3,7 @@
 //! `.output u ; V`.
 
 use crate::expr::Value as Number;
+use std::borrow::Cow;
 
 /// Maximum length of a unit in characters.
 const UNIT: usize = 12;
@@ -94,7 +95,7 @@ pub struct SiUnit {
 const CELSIUS: f64 = 273.15;
 
 /// Unit symbols, each with its size and its exponents in [`SI`].
-const BASE: [(&str, f64, [i8; SI.len()]); 22] = [
+const BASE: [(&str, f64, [i8; SI.len()]); 32] = [
     ("m", 1.0, [0, 1, 0, 0, 0, 0]),
     ("mm", 1e-3, [0, 1, 0, 0, 0, 0]),
     ("um", 1e-6, [0, 1, 0, 0, 0, 0]),
@@ -112,6 +113,16 @@ const BASE: [(&str, f64, [i8; SI.len()]); 22] = [
     ("N", 1.0, [1, 1, -2, 0, 0, 0]),
     ("J", 1.0, [1, 2, -2, 0, 0, 0]),
     ("Hz", 1.0, [0, 0, -1, 0, 0, 0]),
+    ("kHz", 1e3, [0, 0, -1, 0, 0, 0]),
+    ("MHz", 1e6, [0, 0, -1, 0, 0, 0]),
+    ("H", 1.0, [1, 2, -2, -2, 0, 0]),
+    ("mH", 1e-3, [1, 2, -2, -2, 0, 0]),
+    ("F", 1.0, [-1, -2, 4, 2, 0, 0]),
+    ("µF", 1e-6, [-1, -2, 4, 2, 0, 0]),
+    ("T", 1.0, [1, 0, -2, -1, 0, 0]),
+    ("Wb", 1.0, [1, 2, -2, -1, 0, 0]),
+    ("Pa", 1.0, [1, -1, -2, 0, 0, 0]),
+    ("kΩ", 1e3, [1, 2, -3, -2, 0, 0]),
     ("rad", 1.0, [0, 0, 0, 0, 0, 1]),
     ("°", std::f64::consts::PI / 180.0, [0, 0, 0, 0, 0, 1]),
     ("°C", 1.0, [0, 0, 0, 0, 1, 0]),
@@ -122,11 +133,19 @@ const BASE: [(&str, f64, [i8; SI.len()]); 22] = [
 /// Characters of a factor's power.
 const POWERS: &str = "²³⁴-0123456789^";
 
+/// A unit without parentheses: `N/(m·s)` is `N/m/s`. Other parentheses stay, and no symbol has any.
+fn without_parentheses(unit: &str) -> Cow<'_, str> {
+    match unit.strip_suffix(')').and_then(|unit| unit.split_once("/(")) {
+        Some((above, below)) => Cow::Owned(format!("{above}/{}", below.replace(['·', '*'], "/"))),
+        None => Cow::Borrowed(unit),
+    }
+}
+
 /// The word is a product or quotient of powers of known unit symbols, at most [`UNIT`] characters long.
 fn is_unit(word: &str) -> bool {
     !word.is_empty()
         && word.chars().count() <= UNIT
-        && word.split(['/', '·', '*']).all(|factor| {
+        && without_parentheses(word).split(['/', '·', '*']).all(|factor| {
             let factor = factor.trim_end_matches(|one| POWERS.contains(one));
             BASE.iter().any(|(symbol, ..)| *symbol == factor)
         })
@@ -150,7 +169,8 @@ pub fn si(unit: &str) -> Option<SiUnit> {
     }
     let mut si = SiUnit { factor: 1.0, offset: 0.0, exponents: [0; SI.len()] };
     let mut is_below = false;
-    let mut rest = unit;
+    let unit = without_parentheses(unit);
+    let mut rest = &*unit;
     loop {
         let end = rest.find(['/', '·', '*']).unwrap_or(rest.len());
         let symbol = rest[..end].trim_end_matches(|one| POWERS.contains(one));
@@ -185,7 +205,7 @@ mod tests {
     #[test]
     fn units_stand_first_in_a_comment() {
         let source = ".input  w_ref, w   ; rad/s: wanted, measured\n.input n1:int, n2:int ; counts of 0.25 µm\n.input i{i}, y[3] ; A, measured\n\
-                      .output x1, x2 ; m, m/s: position, velocity\n.output tau4 ; N·m\n.output d ; duties, 0 to 1\n.output a ; m/s²\n.output temp ; °C; outside of the table its ends\n";
+                      .output x1, x2 ; m, m/s: position, velocity\n.output tau4 ; N·m\n.output d ; duties, 0 to 1\n.output a ; m/s²\n.output k ; N/(m·s)\n.output temp ; °C; outside of the table its ends\n";
         let sources = [("a.s".to_owned(), source.to_owned())];
         let of = |what, name| unit(&sources, what, name);
         assert_eq!(of(".input", "w").as_deref(), Some("rad/s"));
@@ -195,6 +215,7 @@ mod tests {
             (of(".output", "x1").as_deref(), of(".output", "x2").as_deref()),
             (Some("m"), Some("m/s"))
         );
+        assert_eq!(of(".output", "k").as_deref(), Some("N/(m·s)"));
         assert_eq!((of(".output", "temp").as_deref(), of(".output", "tau5").as_deref()), (Some("°C"), None));
         assert_eq!(
             (of(".output", "tau4").as_deref(), of(".output", "a").as_deref()),
@@ -209,8 +230,10 @@ mod tests {
         assert_eq!(of("m/s²"), of("m*s^-2"));
         assert_eq!(of("mm2"), Some((1e-3 * 1e-3, 0.0, [0, 2, 0, 0, 0, 0])));
         assert_eq!(of("V/A"), of("Ω"));
+        assert_eq!((of("H"), of("F"), of("T"), of("Wb")), (of("V·s/A"), of("A·s/V"), of("N/A/m"), of("V·s")));
+        assert_eq!(of("N/(m·s)"), of("N/m/s"));
         assert_eq!((of("°C"), of("W/°C")), (Some((1.0, 273.15, [0, 0, 0, 0, 1, 0])), of("W/K")));
-        for unclear in ["V/rad·s", "m^", "m2-", "m99999", "s-128", "m/", "", "1/s"] {
+        for unclear in ["V/rad·s", "(m/s", "N/(m)/s", "m^", "m2-", "m99999", "s-128", "m/", "", "1/s"] {
             assert_eq!(of(unclear), None, "{unclear}");
         }
         // 128 is no exponent, and no sum of exponents either.

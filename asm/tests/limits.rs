@@ -135,7 +135,8 @@ fn errors_without_end() {
     let report = error(&".period\n frobnicate\n".repeat(50_000), "unknown-instruction");
     assert_eq!(report.list.len(), limits::SHOWN);
     assert_eq!(report.more_errors, 50_000 - limits::SHOWN);
-    assert!(report.render(false).ends_with("… and 49900 more errors\n"));
+    assert!(report.render(false).ends_with("… and 49980 more errors\n"));
+    assert_eq!(report.render(false).matches("error[").count(), limits::PRINTED);
     error(&" mov 1 1\n".repeat(50_000), "syntax");
     error(&".endr\n".repeat(50_000), "block");
     error(&"x: nop\n".repeat(50_000), "declared-twice");

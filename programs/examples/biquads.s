@@ -1,7 +1,9 @@
-; A low-pass filter of eighth order (Butterworth), as a cascade of four biquads in transposed direct form II.
+; A low-pass filter of eighth order (Butterworth), as a cascade of four
+; biquads in transposed direct form II.
 ;
-; Coefficients are computed by the assembler from the corner frequency; the state is in registers, so that nothing is loaded or
-; stored, and a section's output waits for two operations of its input only.
+; Coefficients are computed by the assembler from the corner frequency;
+; the state is in registers, so that nothing is loaded or stored, and a
+; section's output waits for two operations of its input only.
 
 .schedule on
 
@@ -12,7 +14,8 @@
 .input  x                               ; V, measured
 .output y                               ; V, filtered
 
-; Bilinear transform, prewarped; the pole pairs of a Butterworth filter of order 2N lie at angles of (2i - 1)·90°/2N.
+; Bilinear transform, prewarped; the pole pairs of a Butterworth filter
+; of order 2N lie at angles of (2i - 1)·90°/2N.
 .const  w0 = 2*pi*FC/FS
 .rep    i, 1, N
 .const  al{i} = sin(w0)*cos(pi*(2*i - 1)/(4*N))
@@ -48,7 +51,8 @@ period:
         mov     y, v{N}
         wait    period
 
-; For `takt accuracy`: a signal of full scale. Every such signal leaves the states within 5.5 (the sum of the magnitudes of their responses to
+; For `takt accuracy`: a signal of full scale. Every such signal leaves
+; the states within 5.5 (the sum of the magnitudes of their responses to
 ; an impulse), with a little room.
 .range  x = -1, 1
         .rep    i, 1, N

@@ -1,4 +1,5 @@
-; A lamp that blinks: SECONDS on, SECONDS off. A counter of periods and an output.
+; A lamp that blinks: SECONDS on, SECONDS off. A counter of periods and
+; an output.
 ;
 ;   takt run programs/examples/blink.s --periods 2000
 
@@ -25,7 +26,8 @@ period:
         sel     count, full, 0, count
         wait    period
 
-; For `takt accuracy`: the lamp is on or off, and its counter is cleared at LAST.
+; For `takt accuracy`: the lamp is on or off, and its counter is cleared
+; at LAST.
 .range  lamp = 0, 1
 .range  count = 0, LAST
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,8 +1,11 @@
-; Field-oriented control of a permanent-magnet synchronous motor: Clarke, Park, two PI controllers with decoupling and a voltage
-; limit, inverse Park, and space-vector modulation by the middle of the phases.
+; Field-oriented control of a permanent-magnet synchronous motor:
+; Clarke, Park, two PI controllers with decoupling and a voltage limit,
+; inverse Park, and space-vector modulation by the middle of the phases.
 ;
-; An integrator follows what the bridge gives its axis beyond the decoupling: s' = s + KI·(u - f - s). Within the limits, u - f - s is KP·e, so
-; that the gain of the integral is KP·KI/T = wc·R; at the limits it does not wind up.
+; An integrator follows what the bridge gives its axis beyond the
+; decoupling: s' = s + KI·(u - f - s). Within the limits, u - f - s is
+; KP·e, so that the gain of the integral is KP·KI/T = wc·R; at the
+; limits it does not wind up.
 
 .schedule on
 
@@ -16,10 +19,11 @@
 .const  KPq = wc*Lq
 .const  KId = R*T/Ld                    ; of the way that an integrator goes in a period
 .const  KIq = R*T/Lq
-.const  DMAX = 0.95/sqrt(3)             ; of the bridge's voltage, for d; the longest vector is 1/√3, and q keeps a third of it
+; The longest vector is 1/√3 of the bridge's voltage: q keeps a third of it.
+.const  DMAX = 0.95/sqrt(3)             ; of the bridge's voltage, for d
 
 .input  ia, ib                          ; A, measured phase currents; the third is the rest
-.input  theta                           ; rad, electrical; a turn or two, beyond which sine and cosine lose digits
+.input  theta                           ; rad, electrical, of a turn or two
 .input  we                              ; rad/s, electrical
 .input  udc                             ; V, of the bridge
 .input  id_ref, iq_ref                  ; A
@@ -41,7 +45,7 @@
 .period
 period:
 
-; ---- Clarke and Park: phases to the rotor's axes ---------------------------------------------------------------------------
+; ---- Clarke and Park: phases to the rotor's axes ---------------------
 .reg    sn cs  ibe ibb  idd idq iqd iqq  d q
         fsin    sn, theta
         fcos    cs, theta
@@ -57,7 +61,7 @@ period:
         mov     id, d
         mov     iq, q
 
-; ---- PI in each axis, and what the other axis and the magnets induce ----------------------------------------------------------
+; ---- PI in each axis, and what the other axis and the magnets induce ----
 .reg    ed eq  pd pq  fd fq  vd vq
         fsub    ed, id_ref, d
         fsub    eq, iq_ref, q
@@ -73,7 +77,7 @@ period:
         fadd    vq, pq, sq
         fadd    vq, vq, fq
 
-; ---- In parts of the bridge's voltage, the longest vector is 1/√3: d first, q takes what is left -----------------------------------
+; ---- In parts of the bridge's voltage, the longest vector is 1/√3: d first, q takes what is left ----
 .reg    gain  rd rq  d2 left ud uq
         fdiv    gain, 1.0, udc
         fmul    rd, vd, gain
@@ -84,7 +88,7 @@ period:
         fsqrt   left, left
         fsat    uq, rq, left
 
-; ---- Inverse Park and Clarke; the phases' middle goes to the bridge's middle --------------------------------------------------------
+; ---- Inverse Park and Clarke; the phases' middle goes to the bridge's middle ----
 .reg    al all be bee  h hb  vb vc  low high mid
         fmul    al, ud, cs
         fmul    all, uq, sn
@@ -111,7 +115,7 @@ period:
         fadd    db, vb, 0.5
         fadd    dc, vc, 0.5
 
-; ---- The integrators follow what the bridge gives beyond the decoupling ------------------------------------------------------------
+; ---- The integrators follow what the bridge gives beyond the decoupling ----
 .reg    gd gq
         fmul    gd, ud, udc
         fmul    gq, uq, udc
@@ -125,7 +129,8 @@ period:
         fadd    sq, sq, gq
         wait    period
 
-; For `takt accuracy`: sensors of ±20 A, a bridge between 18 V and 32 V, two turns, at most 10,000 rpm of four pole pairs. The integrators hold
+; For `takt accuracy`: sensors of ±20 A, a bridge between 18 V and 32 V,
+; two turns, at most 10,000 rpm of four pole pairs. The integrators hold
 ; what the bridge gives, and what the decoupling of these asks for.
 .range  ia, ib, id_ref, iq_ref = -20, 20
 .range  theta = -4*pi, 4*pi

@@ -1,5 +1,7 @@
-; Field-oriented control as in foc.s, with the duties published as early as the currents allow: what needs neither current (the rotor's
-; direction, the bridge's limits, the decoupling) is computed for the next period once the duties are published.
+; Field-oriented control as in foc.s, with the duties published as early
+; as the currents allow: what needs neither current (the rotor's
+; direction, the bridge's limits, the decoupling) is computed for the
+; next period once the duties are published.
 
 .schedule on
 .ports  latched
@@ -14,11 +16,12 @@
 .const  KPq = wc*Lq
 .const  KId = R*T/Ld                    ; of the way that an integrator goes in a period
 .const  KIq = R*T/Lq
-.const  DMAX = 0.95/sqrt(3)             ; of the bridge's voltage, for d; the longest vector is 1/√3, and q keeps a third of it
+; The longest vector is 1/√3 of the bridge's voltage: q keeps a third of it.
+.const  DMAX = 0.95/sqrt(3)             ; of the bridge's voltage, for d
 .const  U   = 24.0                      ; V, of the bridge before the first period
 
 .input  ia, ib                          ; A, measured phase currents; the third is the rest
-.input  theta                           ; rad, electrical; a turn or two, beyond which sine and cosine lose digits
+.input  theta                           ; rad, electrical, of a turn or two
 .input  we                              ; rad/s, electrical
 .input  udc                             ; V, of the bridge
 .input  id_ref, iq_ref                  ; A
@@ -59,7 +62,7 @@
 .period
 period:
 
-; ---- Clarke and Park in one: phases to the rotor's axes --------------------------------------------------------------------
+; ---- Clarke and Park in one: phases to the rotor's axes --------------
 .reg    da_a da_b qa_a qa_b  d q
         fmul    da_a, ia, d_a
         fmul    da_b, ib, d_b
@@ -70,7 +73,7 @@ period:
         mov     id, d
         mov     iq, q
 
-; ---- PI in each axis, and what the other axis and the magnets induce. What is known before the currents stands first. ----------
+; ---- PI in each axis, and what the other axis and the magnets induce. What is known before the currents stands first. ----
 .reg    rd rq  pd pq  fd fq  vd vq
         fmul    rd, id_ref, KPd
         fmul    rq, iq_ref, KPq
@@ -86,7 +89,7 @@ period:
         fsub    vq, rq, pq
         fadd    vq, vq, fq
 
-; ---- The bridge gives a vector of length udc/√3: d first, q takes what is left -------------------------------------------------
+; ---- The bridge gives a vector of length udc/√3: d first, q takes what is left ----
 .reg    vd2 left ud uq
         fsat    ud, vd, dmax
         fmul    vd2, ud, ud
@@ -95,7 +98,7 @@ period:
         fsqrt   left, left
         fsat    uq, vq, left
 
-; ---- Inverse Park and Clarke in one; the phases' middle goes to the bridge's middle -------------------------------------------------
+; ---- Inverse Park and Clarke in one; the phases' middle goes to the bridge's middle ----
 .reg    va vaq vb vbq vc vcq  low high mid  ha hb hc
         fmul    va, ud, ad
         fmul    vaq, uq, aq
@@ -119,7 +122,7 @@ period:
         fadd    dc, hc, mid
         publish
 
-; ---- The integrators -----------------------------------------------------------------------------------------------------------
+; ---- The integrators -------------------------------------------------
 .reg    gd gq
         fadd    gd, ud, fd
         fsub    gq, uq, fq
@@ -131,7 +134,7 @@ period:
         fadd    sd, sd, gd
         fadd    sq, sq, gq
 
-; ---- For the next period -------------------------------------------------------------------------------------------------------
+; ---- For the next period ---------------------------------------------
 .reg    turned ahead  sn cs  snr csr  gain  sh ch
         fmul    turned, we, T
         fadd    ahead, theta, turned
@@ -165,7 +168,8 @@ period:
         fmul    v2, vmax, vmax
         wait    period
 
-; For `takt accuracy`: as for foc.s. A state lies within what the inputs of a period make of it.
+; For `takt accuracy`: as for foc.s. A state lies within what the inputs
+; of a period make of it.
 .range  ia, ib, id_ref, iq_ref = -20, 20
 .range  theta = -4*pi, 4*pi
 .range  we = -4200, 4200

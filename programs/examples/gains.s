@@ -1,10 +1,11 @@
-; A motor's speed controller in four equations, whose gains a host sets while it runs: a slider here, `takt live param` on a board.
+; A motor's speed controller in four equations, whose gains a host sets
+; while it runs: a slider here, `takt live param` on a board.
 
 .schedule on
 
 .const  T    = 1e-3                     ; s, sampling period
 .const  UMAX = 24                       ; V, what the amplifier gives
-.const  TT   = 0.05                     ; s, how fast the integrator follows the saturated output
+.const  TT   = 0.05                     ; s, time constant of the anti-windup
 
 .param  kp = 0.3 range 0..4             ; V·s/rad
 .param  ki = 4.0 range 0..60            ; V/rad

@@ -1,7 +1,10 @@
-; A Kalman filter of four states: position and velocity in two directions, of which the two positions are measured.
+; A Kalman filter of four states: position and velocity in two
+; directions, of which the two positions are measured.
 ;
-; Model x' = F·x + noise Q, z = H·x + noise R. Every matrix is written out by repetitions, of a symmetric one its upper half; what is
-; zero or one in F and H costs nothing, because it is not there: F adds T times the velocity to the position.
+; Model x' = F·x + noise Q, z = H·x + noise R. Every matrix is written
+; out by repetitions, of a symmetric one its upper half; what is zero or
+; one in F and H costs nothing, because it is not there: F adds T times
+; the velocity to the position.
 
 .schedule on
 
@@ -44,7 +47,7 @@
 .period
 period:
 
-; ---- Prediction: m = F·s, M = F·P·Fᵀ + Q --------------------------------------------------------------------------------------
+; ---- Prediction: m = F·s, M = F·P·Fᵀ + Q -----------------------------
 .reg    m1 m2
 .reg    M11 M12 M13 M14 M22 M23 M24 M33 M44
         .rep    i, 1, 2
@@ -74,7 +77,7 @@ period:
         fadd    M{i+2}{i+2}, P{i+2}{i+2}, q33
         .endr
 
-; ---- Gain: K = M·Hᵀ·S⁻¹, S = the positions' block of M, and R --------------------------------------------------------------------
+; ---- Gain: K = M·Hᵀ·S⁻¹, S = the positions' block of M, and R --------
 .reg    S11 S22 det dd inv I11 I22 I12
         fadd    S11, M11, RX
         fadd    S22, M22, RX
@@ -98,7 +101,7 @@ period:
         .assume K{i}2 <= (i <= 2 ? 1 : 8)
         .endr
 
-; ---- Correction: s = m + K·(z - H·m), P = M - K·H·M ------------------------------------------------------------------------------
+; ---- Correction: s = m + K·(z - H·m), P = M - K·H·M ------------------
 .reg    e1 e2
         fsub    e1, z1, m1
         fsub    e2, z2, m2
@@ -130,8 +133,10 @@ period:
         mov     p33, P33
         wait    period
 
-; For `takt accuracy`: positions within 100 m, speeds within 50 m/s. A variance begins at P0 and ends below it; the two directions have
-; nothing to do with one another, so that what they have in common stays zero.
+; For `takt accuracy`: positions within 100 m, speeds within 50 m/s. A
+; variance begins at P0 and ends below it; the two directions have
+; nothing to do with one another, so that what they have in common stays
+; zero.
 .range  z1, z2, s1, s2 = -100, 100
 .range  s3, s4 = -50, 50
 .range  P11, P22, P33, P44 = 0, P0

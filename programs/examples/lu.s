@@ -1,5 +1,6 @@
-; Four linear equations, A·x = b, by elimination with partial pivoting: no branches, rows are exchanged by selection, so that the
-; time is the same whatever the matrix, and the scheduler sees one straight line.
+; Four linear equations, A·x = b, by elimination with partial pivoting:
+; no branches, rows are exchanged by selection, so that the time is the
+; same whatever the matrix, and the scheduler sees one straight line.
 
 .schedule on
 
@@ -14,7 +15,7 @@
 .rep    i, 1, N
 .output x{i}
 .endr
-.output singular:int                    ; 1: a pivot is zero, or something is no number; x keeps its last values
+.output singular:int                    ; 1: no solution; x keeps its values
 
 .once
         .rep    i, 1, N
@@ -26,8 +27,9 @@
 .period
 period:
 
-; Row i of the matrix before step k is a{k}i1 … a{k}i5; the right-hand side is column N + 1. Names are never written twice, so that
-; an exchange needs no copy: what would be one is another name.
+; Row i of the matrix before step k is a{k}i1 … a{k}i5; the right-hand
+; side is column N + 1. Names are never written twice, so that an
+; exchange needs no copy: what would be one is another name.
 .rep    i, 1, N
 .rep    j, 1, N
 .reg    a1{i}{j}
@@ -44,8 +46,9 @@ period:
 .endm
 
 .rep    k, 1, N
-; ---- The row with the largest element of column k is found by comparison with one row after the other: p{k}{i} is the largest of rows
-;      k to i, o{k}{i} what is left in row i -------------------------------------------------------------------------------------
+; ---- The row with the largest element of column k -------------------
+; One row after the other is compared: p{k}{i} is the largest of rows k
+; to i, o{k}{i} what is left in row i.
 .rep    i, k+1, N
 .reg    u{k}{i} v{k}{i} g{k}{i}:int
 .rep    j, k, N+1
@@ -66,7 +69,7 @@ period:
         .endif
 .endr
 .endr
-; ---- Elimination below the pivot, whose inverse is kept -------------------------------------------------------------------------------
+; ---- Elimination below the pivot, whose inverse is kept --------------
 .reg    r{k}
         .if     k < N
         fdiv    r{k}, 1.0, p{k}{N}{k}
@@ -84,7 +87,7 @@ period:
 .endr
 .endr
 
-; ---- From the last row back ------------------------------------------------------------------------------------------------------------
+; ---- From the last row back ------------------------------------------
 .reg    y{N}
         fmul    y{N}, a{N}{N}{N+1}, r{N}
 .rep    m, 1, N-1
@@ -115,7 +118,8 @@ period:
 .endr
         wait    period
 
-; For `takt accuracy`: elements up to 20, right-hand sides up to 10, as in lu.csv. Outputs keep their values where the matrix is singular.
+; For `takt accuracy`: elements up to 20, right-hand sides up to 10, as
+; in lu.csv. Outputs keep their values where the matrix is singular.
 .rep i, 1, N
 .rep j, 1, N
 .range  A{i}{j} = -20, 20

@@ -1,4 +1,5 @@
-; A pendulum on a cart, kept upright by feedback of the state and of the integral of the cart's position; the gains are those of a
+; A pendulum on a cart, kept upright by feedback of the state and of the
+; integral of the cart's position; the gains are those of a
 ; linear-quadratic regulator for the parameters of cart_pendulum.toml.
 
 .schedule on
@@ -28,7 +29,8 @@ period: force = max(min(KX*(x - x_ref) + KV*v + KA*angle + KR*rate + s, FMAX), -
         s = s + (x - x_ref)*(KI*T)
         wait    period
 
-; For `takt accuracy`: a track of 2 m, a cart of at most 5 m/s, and a pendulum that turns within 20 rad/s.
+; For `takt accuracy`: a track of 2 m, a cart of at most 5 m/s, and a
+; pendulum that turns within 20 rad/s.
 .range  x = -1, 1
 .range  v = -5, 5
 .range  angle = -pi, pi

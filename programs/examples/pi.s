@@ -1,4 +1,5 @@
-; A PI controller of a motor's speed, whose integrator does not wind up: what the actuator cannot do is fed back into it.
+; A PI controller of a motor's speed, whose integrator does not wind up:
+; what the actuator cannot do is fed back into it.
 ;
 ;   v = KP·e + s,  u = v within ±UMAX,  s' = s + T·(KI·e + (u - v)/TT)
 
@@ -8,7 +9,7 @@
 .const  KP   = 0.8                      ; V·s/rad
 .const  KI   = 12                       ; V/rad
 .const  UMAX = 24                       ; V, what the amplifier gives
-.const  TT   = 0.05                     ; s, how fast the integrator follows the saturated output
+.const  TT   = 0.05                     ; s, time constant of the anti-windup
 
 .input  w_ref, w                        ; rad/s: wanted, measured
 .output u                               ; V
@@ -36,7 +37,8 @@ period:
         fadd    s, s, di
         wait    period
 
-; For `takt accuracy`: what the encoder and the reference can say, and what the integrator can hold.
+; For `takt accuracy`: what the encoder and the reference can say, and
+; what the integrator can hold.
 .range  w_ref, w = -1000, 1000
 .range  s = -2*UMAX, 2*UMAX
 ; SPDX-License-Identifier: MIT OR Apache-2.0

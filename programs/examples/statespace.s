@@ -1,10 +1,13 @@
-; A controller in state space: 12 states, 3 measurements, 4 outputs, as linear-quadratic-Gaussian design gives it. It quiets six masses in a
-; chain of springs; statespace.csv is a record of its loop, in which a mass gets a blow and later a lasting push (plant/chain.py).
+; A controller in state space: 12 states, 3 measurements, 4 outputs, as
+; linear-quadratic-Gaussian design gives it. It quiets six masses in a
+; chain of springs; statespace.csv is a record of its loop, in which a
+; mass gets a blow and later a lasting push (plant/chain.py).
 ;
 ;   x' = A·x + B·y      u = C·x + D·y
 ;
-; The matrices lie in data memory, row by row. A loop takes two rows at a time, so that their sums, each of which waits for the
-; adder, alternate; within a row the sum is written out.
+; The matrices lie in data memory, row by row. A loop takes two rows at
+; a time, so that their sums, each of which waits for the adder,
+; alternate; within a row the sum is written out.
 
 .schedule on
 
@@ -35,7 +38,8 @@ period: .for    i, 1, P                 ; outputs first: the plant waits for the
         x[:] = next[:]
         wait    period
 
-; For `takt accuracy`: measurements in units of their full scale, and the states that these lead to.
+; For `takt accuracy`: measurements in units of their full scale, and
+; the states that these lead to.
 .range  y = -1, 1
 .range  x = -4, 4
 ; SPDX-License-Identifier: MIT OR Apache-2.0

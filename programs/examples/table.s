@@ -1,10 +1,11 @@
-; A thermistor read through a divider: voltage to temperature by a table in data memory, interpolated. Memory is right here: the
-; entry depends on a measurement, which no register's name can.
+; A thermistor read through a divider: voltage to temperature by a table
+; in data memory, interpolated. Memory is right here: the entry depends
+; on a measurement, which no register's name can.
 
 .include <math.s>
 .schedule on
 
-.const  UREF = 3.3                      ; V, of the divider; the thermistor is on the ground's side
+.const  UREF = 3.3                      ; V, of the divider above the thermistor
 .const  RPULL = 10e3                    ; Ω
 .const  R25  = 10e3                     ; Ω, at 25 °C
 .const  B    = 3950                     ; K
@@ -35,9 +36,9 @@ period:
         fsub    pos, u, LOW
         fmul    pos, pos, 1/STEP
         clamp   pos, pos, 0, N
-        feq     known, u, u             ; what is no number must not become an address: it comes out as no number all the same
+        feq     known, u, u             ; no number becomes an address
         sel     safe, known, pos, zero
-        fsub    below, safe, 0.5        ; ftoi rounds; where two intervals meet, either will do
+        fsub    below, safe, 0.5        ; ftoi rounds; at a boundary either will do
         ftoi    k, below
         itof    whole, k
         fsub    part, pos, whole
@@ -48,6 +49,7 @@ period:
         fadd    temp, t0, dt
         wait    period
 
-; For `takt accuracy`: what a converter of 5 V can say, beyond the divider's supply.
+; For `takt accuracy`: what a converter of 5 V can say, beyond the
+; divider's supply.
 .range  u = -1, 5
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,7 +1,9 @@
-; One period of the hybrid robot's tracking algorithm, (7)-(37) of the founding paper, with shared work done once.
+; One period of the hybrid robot's tracking algorithm, (7)-(37) of the
+; founding paper, with shared work done once.
 ;
-; Written in the order of the equations; the assembler packs the bundles (docs/scheduling.md). Where a formula differs from
-; the printed one, the identity that leads from one to the other stands beside it.
+; Written in the order of the equations; the assembler packs the bundles
+; (docs/scheduling.md). Where a formula differs from the printed one,
+; the identity that leads from one to the other stands beside it.
 
 .include "robot.s"
 .schedule on
@@ -10,7 +12,7 @@
 .const  J    = J0 + ms*c^2              ; kg·m², an arm about its pivot, with its slider
 .const  Rc   = R/lcount                 ; R in counts
 
-; ---- State, kept between periods ----------------------------------------------------------------------------------
+; ---- State, kept between periods -------------------------------------
 .rep i, 1, 5
 .state  np{i}:int                       ; counts one period ago
 .state  s{i}                            ; integrator, times KI
@@ -34,12 +36,15 @@ first:                                  ; before the first period: previous posi
 period:
         .late   n1, n2, n3, n4, n5 = 1  ; what needs no measurement goes before the sample, for up to a cycle
 
-; ---- 1. Inverse kinematics with derivatives, (7)-(11) --------------------------------------------------------------
-; With |p_i| = R: l² = |d|² = x² + y² + z² + R² - 2·(x·xp + y·yp), and likewise d·v = x·vx + y·vy + z·vz - (xp·vx + yp·vy).
-; The sum is taken about 1/2, as (small terms + (z² - 1/2)) + (R² + 1/2): z² - 1/2 is exact for 1/4 ≤ z² ≤ 1, so that only the last
-; addition rounds at the size of the sum.
+; ---- 1. Inverse kinematics with derivatives, (7)-(11) ----------------
+; With |p_i| = R: l² = |d|² = x² + y² + z² + R² - 2·(x·xp + y·yp), and
+; likewise d·v = x·vx + y·vy + z·vz - (xp·vx + yp·vy). The sum is taken
+; about 1/2, as (small terms + (z² - 1/2)) + (R² + 1/2): z² - 1/2 is
+; exact for 1/4 ≤ z² ≤ 1, so that only the last addition rounds at the
+; size of the sum.
 .const  xp = sqrt(3)/2*R                ; xp_2 = -xp_3; yp_1 = R, yp_2 = yp_3 = -R/2
-; Of three like terms the sum's is added first, but in the lengths: from these leads the longest chain, and of its sum xy is late.
+; Of three like terms the sum's is added first, but in the lengths: from
+; these leads the longest chain, and of its sum xy is late.
 .macro  arms    s, f, px, py, sum       ; s_i = sum - f·(px·xp_i + py·yp_i), i = 1, 2, 3
 .reg    px2 py2 py1 side
         fmul    px2, px, f*xp
@@ -82,7 +87,8 @@ period:
         fdiv    v{i}d, dv{i}, l{i}d
         .endr
 
-; a = (vx² + vy² + vz² + d·(ax,ay,az) - v²) / l, with v² = (d·v)² / l²: no quotient waits for another.
+; a = (vx² + vy² + vz² + d·(ax,ay,az) - v²) / l, with v² = (d·v)² / l²:
+; no quotient waits for another.
 .reg    vxx vyy vzz vv  xa ya za da  da1 da2 da3  w1 w2 w3
         fmul    vxx, vx, vx
         fmul    vyy, vy, vy
@@ -113,8 +119,9 @@ period:
         mov     ep4d, eps_alpha
         mov     ep5d, eps_gamma
 
-; ---- 2. Encoders to positions and velocities; the difference of counts is exact -------------------------------------
-; Of the velocity only KV·v is wanted, and lengths are wanted in counts, too: exact up to 2^24, 4 m.
+; ---- 2. Encoders to positions and velocities; the difference of counts is exact ----
+; Of the velocity only KV·v is wanted, and lengths are wanted in counts,
+; too: exact up to 2^24, 4 m.
 .rep i, 1, 5
 .reg    p{i} c{i} dn{i}:int vel{i}
         itof    c{i}, n{i}
@@ -125,7 +132,7 @@ period:
         fmul    vel{i}, vel{i}, KV*count{i}/Ts
 .endr
 
-; ---- 3. Forward kinematics, (14)-(15), in counts ---------------------------------------------------------------------
+; ---- 3. Forward kinematics, (14)-(15), in counts ---------------------
 ; With u = l1² - l2², w = l1² - l3²: y = -(u + w)/(6R), x = -(w - u)/(2√3R).
 .reg    q1 q2 q3  u w uw  wu fx fxx fy fyy fzz fz
         .rep i, 1, 3
@@ -144,10 +151,12 @@ period:
         fsub    fzz, fzz, fyy
         fsqrt   fz, fzz                 ; z = √(l1² - x² - (y - R)²)
 
-; ---- 4. Reduced masses, (23), in kg ------------------------------------------------------------------------------------
+; ---- 4. Reduced masses, (23), in kg ----------------------------------
 ; With b_i = kb/l_i: 2·kb²·c_ij = (l_i² + l_j² - 3R²)·b_i·b_j, and
-; M_ii = m_s + m_p + Σ_j [m_s·c_ij² + κ_j·(1 - c_ij²)] = 3·m_s + m_p - Σ_j (m_s - κ_j)·(1 - c_ij²),
-; m_s - κ_j = 2·m_s·c/l_j - J/l_j² = J/kb²·b_j·(2·kb·m_s·c/J - b_j). kb is such that the factors J/kb² and 1/(2·kb²)² cancel.
+;   M_ii = m_s + m_p + Σ_j [m_s·c_ij² + κ_j·(1 - c_ij²)]
+;        = 3·m_s + m_p - Σ_j (m_s - κ_j)·(1 - c_ij²),
+;   m_s - κ_j = 2·m_s·c/l_j - J/l_j² = J/kb²·b_j·(2·kb·m_s·c/J - b_j).
+; kb is such that the factors J/kb² and 1/(2·kb²)² cancel.
 .const  kb = (J/4/lcount^2)^(1/6)       ; counts; in the formula m
 .reg    b1 b2 b3  t12 t13 t23 qm  s12 s13 s23  k1 k2 k3  M1 M2 M3
         .rep i, 1, 3
@@ -182,8 +191,9 @@ period:
         mass    2, 1, s12, 3, s23
         mass    3, 1, s13, 2, s23
 
-; ---- 5. Gravity, (24)-(25), in closed form ----------------------------------------------------------------------------
-; G_i = l_i·λ_i·m_z·g/z; 3R²·λ1 = R² - (u + w)/3, 3R²·λ2 = 3R²·λ1 + u, 3R²·λ3 = 3R²·λ1 + w; m_z = m_p + 3·m_s + q·Σ 1/l_i.
+; ---- 5. Gravity, (24)-(25), in closed form ---------------------------
+; G_i = l_i·λ_i·m_z·g/z; 3R²·λ1 = R² - (u + w)/3, 3R²·λ2 = 3R²·λ1 + u,
+; 3R²·λ3 = 3R²·λ1 + w; m_z = m_p + 3·m_s + q·Σ 1/l_i.
 .reg    la1 la2 la3 third sb mg  G1 G2 G3
         fmul    third, uw, 1/3
         fsub    la1, Rc^2, third
@@ -199,15 +209,17 @@ period:
         fmul    G{i}, G{i}, mg
         .endr
 
-; ---- 6. Table dynamics, (27) --------------------------------------------------------------------------------------------
+; ---- 6. Table dynamics, (27) -----------------------------------------
 .reg    G4
         fsin    G4, p4
         fmul    G4, G4, rm4*g
 
-; ---- 7, 8. Control law, (28), (36), with the nonlinear integrator, (29)-(35), (37) -----------------------------------------
-; The integrator is kept times KI, so its gain is (φ_t + 1)·Ts·KI. In place of tc the gain itself is kept: it starts at 2ξc - 1 times
-; Ts·KI when the sign changes (tc = 0), and falls by the same amount every period, to ξc times at tc = Tc/2 and to 1 at tc = Tc. It is
-; compared half a step off, where rounding does not matter.
+; ---- 7, 8. Control law, (28), (36), with the nonlinear integrator, (29)-(35), (37) ----
+; The integrator is kept times KI, so its gain is (φ_t + 1)·Ts·KI. In
+; place of tc the gain itself is kept: it starts at 2ξc - 1 times Ts·KI
+; when the sign changes (tc = 0), and falls by the same amount every
+; period, to ξc times at tc = Tc/2 and to 1 at tc = Tc. It is compared
+; half a step off, where rounding does not matter.
 .const  fall = 2*(xc - 1)*Ts/Tc*gain
 .macro  integrator i, sign, e           ; s_i = sat(s_i + (φ_t + 1)·Ts·KI·e)
 .reg    sg same:int later held eabs large:int early:int ramp step
@@ -275,7 +287,7 @@ period:
 
         wait    period
 
-; ---- Ranges, on which `takt accuracy` rests; robot.s has those of the inputs --------------------------------------------------
+; ---- Ranges, on which `takt accuracy` rests; robot.s has those of the inputs ----
 .rep i, 1, 3
 .range  np{i} = 3160000, 3800000
 .endr

@@ -283,12 +283,18 @@ impl Diagnostics {
     }
 
     /// The text for a terminal: message, file, line, column, source line and caret of each diagnostic. Control characters in
-    /// sources, file names and messages are escaped.
+    /// sources, file names and messages are escaped. At most [`limits::PRINTED`] of each severity are printed, the others counted.
     pub fn render(&self, colour: bool) -> String {
         let mut view = View::new(&self.sources);
         let config = term::Config { tab_width: 8, ..term::Config::default() };
         let mut out = Vec::new();
+        let (mut errors, mut warnings) = (0, 0);
         for diagnostic in &self.list {
+            let count = if diagnostic.severity == Severity::Error { &mut errors } else { &mut warnings };
+            *count += 1;
+            if *count > limits::PRINTED {
+                continue;
+            }
             let shown = view.focus(diagnostic);
             // Cannot fail: the view knows every place that `focus` returns, and writing to a vector succeeds.
             let _ = if colour {
@@ -301,7 +307,12 @@ impl Diagnostics {
             };
         }
         let mut text = String::from_utf8_lossy(&out).into_owned();
-        for (count, what) in [(self.more_errors, "error"), (self.more_warnings, "warning")] {
+        let beyond = |count: usize| count.saturating_sub(limits::PRINTED);
+        let more = [
+            (self.more_errors + beyond(errors), "error"),
+            (self.more_warnings + beyond(warnings), "warning"),
+        ];
+        for (count, what) in more {
             if count > 0 {
                 text.push_str(&format!("… and {count} more {what}{}\n", if count == 1 { "" } else { "s" }));
             }

@@ -3,6 +3,8 @@
 
 /// Errors, and warnings, that are kept and shown; the rest are counted.
 pub const SHOWN: usize = 100;
+/// Errors, and warnings, that are printed: a file that is no source has one in each line, and the first say so.
+pub const PRINTED: usize = 20;
 /// Bytes of a source line that a shown diagnostic quotes; of a longer line, the part around the error.
 pub const QUOTED_BYTES: usize = 160;
 /// Characters of the longest misspelt name that is compared with known names.

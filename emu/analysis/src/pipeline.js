@@ -4,6 +4,8 @@
 const NS = "http://www.w3.org/2000/svg";
 /** Pixels of a row at least and, where few rows leave room, at most; of the axis, the least and the largest of a column, before the first. */
 const ROW = 18, TALL = 30, AXIS = 22, NARROW = 1.5, WIDE = 48, GAP = 6;
+/** Width of a telephone, and of a column there at least and at most until somebody zooms; elsewhere. */
+const PHONE = 480, THIN = [4, 20], USUAL = [7, 20];
 /** Pixels below the rows that are enough for the stalls. */
 const ROOM = 200;
 /** Rows that are drawn beyond the edges. */
@@ -373,7 +375,7 @@ export class Pipeline {
     // As wide as the longest label asks for, but no wider than leaves the chart its room.
     this.labelWidth = Math.round(Math.min(this.longest * 7.3 + 18, 430, 0.42 * scroll.clientWidth));
     // Until somebody zooms, the picture follows the size: a new one fills the width, as far as its columns can be told apart and are no bars.
-    const [least, most] = { new: [7, 20], all: [NARROW, WIDE] }[this.fits] ?? [this.width, this.width];
+    const [least, most] = { new: scroll.clientWidth < PHONE ? THIN : USUAL, all: [NARROW, WIDE] }[this.fits] ?? [this.width, this.width];
     this.width = Math.min(most, Math.max(least, (scroll.clientWidth - this.labelWidth - 4 * GAP) / Math.max(1, this.columns)));
     this.row = Math.floor(Math.min(TALL, Math.max(ROW, (scroll.clientHeight - AXIS - 8) / Math.max(1, this.rows.length))));
     // Where the rows leave room, the stalls have it.

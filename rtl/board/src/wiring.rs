@@ -16,6 +16,9 @@ use std::ops::Range;
 use takt_isa::Type;
 use times::Times;
 
+/// Number of ports that an application lacks from which on the wiring is taken for another application's.
+const FOREIGN: usize = 3;
+
 /// Most peripherals of a wiring.
 pub const PERIPHERALS: usize = 64;
 /// The period in µs of a program without a wiring: the founding paper's.
@@ -263,11 +266,14 @@ impl Wiring {
     ) -> Result<(), Vec<Mistake>> {
         let (document, application) = (Document::new(file, text), application.into());
         let mut driven: BTreeMap<usize, &str> = BTreeMap::new();
+        let (mut all, mut missing) = (0, 0);
         for peripheral in &self.peripherals {
             for (port, direction, place) in &peripheral.ports {
+                all += 1;
                 let found = match application.connect(*direction, port) {
                     Ok(found) => found,
                     Err(text) => {
+                        missing += 1;
                         document.mistake(place, text);
                         continue;
                     }
@@ -280,6 +286,14 @@ impl Wiring {
                 }
                 self.check_type(&document, peripheral, (port.as_str(), found.ty), *direction, place);
             }
+        }
+        // The file's first line, so that this comes before the ports.
+        if missing >= FOREIGN && 2 * missing > all {
+            let what = if application.is_program() { "program" } else { "system" };
+            let text = format!(
+                "this wiring belongs to another {what}: of its {all} ports {missing} are not those of this {what}"
+            );
+            document.mistake(&(0..0), text);
         }
         if let Some(scope) = &self.scope {
             let cores = &application.description().cores;

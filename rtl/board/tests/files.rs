@@ -299,6 +299,9 @@ fn ports_must_be_the_programs() {
         report(&PROGRAM.replace("bad", "worse")),
         "robot.toml:19:33: the program has no input port `bad`; there are n, worse"
     );
+    let other = report(".input a\n.output b\n.period\np: mov b, a\n wait p\n");
+    let first = "robot.toml:1:1: this wiring belongs to another program: of its 3 ports 3 are not those of this program";
+    assert_eq!(other.lines().next(), Some(first), "{other}");
     let float = PROGRAM.replace("n:int", "n").replace("itof    force, n", "fadd force, n, n");
     assert!(report(&float).contains("19:19: input port `n` is a float"), "{}", report(&float));
     let integer = PROGRAM.replace("force\n", "force:int\n").replace("itof    force, n", "mov force, n");

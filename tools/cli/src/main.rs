@@ -19,7 +19,7 @@ use terminal::suggest;
 
 /// Robot controllers on a floating-point processor whose every cycle is accounted for.
 #[derive(Parser)]
-#[command(name = "takt", version, max_term_width = 110, after_help = AFTER_HELP)]
+#[command(name = "takt", version, after_help = AFTER_HELP)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -65,6 +65,7 @@ enum Command {
     Fmu(commands::fmu::ToFmu),
     Lsp(commands::lsp::Lsp),
     Dap(commands::dap::Dap),
+    Editor(commands::editor::Editor),
     Rtl(commands::rtl::Rtl),
     Board(commands::board::Boards),
     Load(commands::live::LoadBoard),
@@ -134,6 +135,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Fmu(fmu) => commands::fmu::run(fmu, color, out),
         Command::Lsp(lsp) => commands::lsp::run(lsp, color, out),
         Command::Dap(dap) => commands::dap::run(dap, color, out),
+        Command::Editor(editor) => commands::editor::run(editor, out),
         Command::Rtl(rtl) => commands::rtl::run(rtl, color, out),
         Command::Board(board) => commands::board::run(board, color, out),
         Command::Load(load) => commands::live::load(load, color, out),
@@ -158,8 +160,10 @@ fn fit(command: clap::Command, page: Page) -> clap::Command {
 
 /// Parses the arguments. If clap has answered instead (help, version, a mistake), the error is the exit status.
 fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
-    let page = Page::of_stdout(None);
-    let command = groups::grouped(fit(Arguments::command(), page), page);
+    let page = Page::of_help();
+    // One width for clap's lines and those that it does not fold.
+    let command = Arguments::command().term_width(page.columns());
+    let command = groups::grouped(fit(command, page), page);
     let parsed = command.try_get_matches().and_then(|matches| Arguments::from_arg_matches(&matches));
     parsed.map_err(|mut answer| {
         suggest::suggest(&mut answer);

@@ -740,6 +740,84 @@ fn commands(help: &str) -> Vec<&str> {
     names.map(|line| line.split_whitespace().next().unwrap()).filter(|name| *name != "help").collect()
 }
 
+/// Help has one width: that of the terminal, or, in a pipe, of the environment's `COLUMNS`.
+#[test]
+fn help_has_the_width_that_the_environment_states() {
+    let folder = Folder::new();
+    for (stated, most) in [("60", 60), ("200", 110)] {
+        for line in ["--help", "run --help", "board sim --help"] {
+            let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
+            command.env("COLUMNS", stated);
+            let longest = RunOutput::of(command).ok().lines().map(|line| line.chars().count()).max();
+            assert!(
+                longest.is_some_and(|longest| longest > most - 12 && longest <= most),
+                "{line}: {longest:?}"
+            );
+        }
+    }
+}
+
+/// A message about missing inputs names the table beside the program; one about a missing table names those in the folder.
+#[test]
+fn messages_name_the_tables_that_lie_near() {
+    let folder = Folder::new();
+    folder.write("law.s", ".input x\n.output y\n.period\np: mov y, x\n wait p\n");
+    let bare = folder.line("run law.s").stderr;
+    assert!(bare.ends_with("--inputs or --periods\n"), "{bare}");
+    folder.write("law.csv", "x\n1\n");
+    let refused = folder.line("run law.s").stderr;
+    assert!(refused.ends_with("such as `--inputs law.csv`, which lies beside it\n"), "{refused}");
+    let missing = folder.line("run law.s --inputs recorded.csv").stderr;
+    assert!(missing.ends_with("; in this folder there are law.csv\n"), "{missing}");
+    let counted = folder.line("run law.s --inputs law.csv").ok();
+    assert!(
+        counted.starts_with("1 period on t3: ") && counted.contains(" cycles, 0 deadlines missed\n"),
+        "{counted}"
+    );
+}
+
+/// Editors' files are listed, written when asked for, and not written twice; an own configuration stays.
+#[test]
+fn an_editor_is_set_up_once() {
+    let folder = Folder::new();
+    let line = |line: &str| {
+        let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
+        command.env("HOME", folder.path()).env_remove("XDG_CONFIG_HOME");
+        RunOutput::of(command).ok()
+    };
+    let listed = line("editor neovim");
+    assert!(listed.starts_with("create ") && listed.contains(".config/nvim/plugin/takt.lua\n"), "{listed}");
+    assert!(
+        listed.ends_with("nothing is written; --write does it\n") && folder.list().is_empty(),
+        "{listed}"
+    );
+    std::fs::create_dir_all(folder.path().join(".config/helix")).unwrap();
+    folder.write(".config/helix/languages.toml", "# mine");
+    for (editor, file) in [
+        ("neovim", ".config/nvim/plugin/takt.lua"),
+        ("helix", ".config/helix/languages.toml"),
+        ("emacs", ".emacs.d/takt.el"),
+    ] {
+        let written = line(&format!("editor {editor} --write"));
+        assert!(written.contains("\nwritten. ") && folder.read_text(file).contains("takt"), "{written}");
+        let again = line(&format!("editor {editor} --write"));
+        assert!(again.contains(" as it is\n") && again.ends_with("nothing to do\n"), "{again}");
+    }
+    let helix = folder.read_text(".config/helix/languages.toml");
+    assert!(helix.starts_with("# mine\n") && !helix.contains("/path/to"), "{helix}");
+    assert!(folder.read_text(".emacs.d/init.el").contains("(load (expand-file-name \"takt\""));
+}
+
+/// A file that is no source has an error in each line: the first ones are enough.
+#[test]
+fn many_errors_are_counted() {
+    let folder = Folder::new();
+    folder.write("text.s", "This is no source.\n".repeat(60));
+    let refused = folder.line("run text.s").stderr;
+    assert_eq!(refused.matches("error[").count(), 20, "{refused}");
+    assert!(refused.ends_with("… and 40 more errors\n"), "{refused}");
+}
+
 /// Every command has short and long help; each option and operand is explained; examples use existing options; and no line exceeds the
 /// promised width.
 #[test]
@@ -1020,7 +1098,7 @@ fn accuracy_shows_literals_by_their_values() {
     assert!(!done.stdout.contains("x14"), "{}", done.stdout);
     // The output's row says which condition is missing.
     let row = done.stdout.lines().find(|line| line.starts_with("  y ")).expect("the row of y");
-    assert!(row.contains(" needs ") && row.ends_with(" other than 0 at literal.s:6:8-22"), "{row}");
+    assert!(row.contains(" bounded if ") && row.ends_with(" is never 0 at literal.s:6:8-22"), "{row}");
     let condition =
         "\nconditions that exclude these\n  `max(x, least)` keeps a divisor from zero; `.assume x >= least`";
     assert!(done.stdout.contains(condition), "{}", done.stdout);

@@ -203,7 +203,9 @@ pub(crate) fn head(session: &mut Session) -> String {
             match (stall, issue) {
                 (Some(cause), Some(issue)) => {
                     let why = program.cause_text(cause);
-                    format!("{at}{label} issues in {} cycles: {why}", issue - cycle)
+                    let cycles = issue - cycle;
+                    let ending = if cycles == 1 { "" } else { "s" };
+                    format!("{at}{label} issues in {cycles} cycle{ending}: {why}")
                 }
                 _ => format!("{at}{label} issues"),
             }

@@ -27,11 +27,11 @@ from takt.mujoco import CLOCK, Controller
 PERIOD, TIME, STARTS = 0.02, 10.0, 100
 #: Model with the masses, lengths and inertias of acrobot.py; both angles are 0 when upright.
 MODEL = """<mujoco><option gravity="0 0 -9.81" timestep="0.01" integrator="RK4"/>
-<visual><global offwidth="960" offheight="720"/></visual>
+<visual><headlight ambient="0.45 0.45 0.45" diffuse="0.2 0.2 0.2"/><global offwidth="960" offheight="720"/></visual>
 <asset><texture name="sky" type="skybox" builtin="gradient" rgb1="0.93 0.95 0.98" rgb2="0.75 0.8 0.87" width="256" height="256"/></asset>
 <default><geom contype="0" conaffinity="0"/><joint axis="0 1 0" damping="0.1"/></default>
 <worldbody><light directional="true" dir="-0.35 0.7 -0.85" diffuse="0.8 0.8 0.8"/>
-<geom type="plane" pos="0 0 -3.2" size="6 6 0.1" rgba="0.82 0.84 0.86 1"/>
+<geom type="plane" pos="0 0 -3.2" size="6 6 0.1" rgba="0.86 0.88 0.91 1"/>
 <geom type="cylinder" fromto="0 -0.16 0 0 0.16 0" size="0.12" rgba="0.3 0.32 0.36 1"/>
 <body><joint name="shoulder"/><inertial mass="1" pos="0 0 0.5" diaginertia="0.083 0.083 1e-4"/>
 <geom type="capsule" fromto="0 0 0 0 0 1" size="0.06" rgba="0.49 0.68 0.8 1"/>
@@ -137,6 +137,17 @@ def picture(result: Swings, file: str) -> None:
         matplotlib.image.imsave(file, renderer.render())
 
 
+#: Line of each case in the plot: they nearly agree, so that broad pale lines lie behind narrow ones.
+LOOKS: dict[str, dict[str, Any]] = {
+    "on time": {"color": "C0", "lw": 5, "alpha": 0.35, "zorder": 1},
+    "a period late": {"color": "C1"},
+    "two periods late": {"color": "C2", "ls": "--"},
+    "encoders of 10 bits": {"color": "C4", "lw": 3, "alpha": 0.5, "zorder": 0},
+}
+#: Duration that the plot shows, s: afterwards all stand.
+SHOWN = 5.0
+
+
 def plot(results: dict[str, Swings], file: str) -> None:
     import pictures
 
@@ -145,9 +156,9 @@ def plot(results: dict[str, Swings], file: str) -> None:
         if name == "starts thrice as far off":
             continue  # its first start is at rest as well
         times = PERIOD * np.arange(1, result.distance.shape[1] + 1)
-        axes[0].plot(times, result.distance[0], label=name)
-        axes[1].plot(times, result.torque[0])
-    axes[0].set(title="angle from upright, rad", xlim=(0, times[-1]))
+        axes[0].plot(times, result.distance[0], label=name, **LOOKS[name])
+        axes[1].plot(times, result.torque[0], **LOOKS[name])
+    axes[0].set(title="angle from upright, rad", xlim=(0, SHOWN))
     axes[1].set(xlabel="time, s", title="torque, N m")
     pictures.legend(figure, axes[0], 2)
     pictures.save(figure, file)

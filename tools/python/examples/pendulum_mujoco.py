@@ -26,10 +26,10 @@ from takt.mujoco import CLOCK, Controller
 PERIOD, TIME = 0.05, 20.0
 #: Model with weight, length and inertia 1, as in training; the angle is 0 when upright.
 MODEL = """<mujoco><option gravity="0 0 -1" timestep="0.01" integrator="RK4"/>
-<visual><global offwidth="960" offheight="720"/></visual>
+<visual><headlight ambient="0.45 0.45 0.45" diffuse="0.2 0.2 0.2"/><global offwidth="960" offheight="720"/></visual>
 <asset><texture name="sky" type="skybox" builtin="gradient" rgb1="0.93 0.95 0.98" rgb2="0.75 0.8 0.87" width="256" height="256"/></asset>
 <worldbody><light pos="1.5 -2.5 3" dir="-0.4 0.7 -0.8" diffuse="0.8 0.8 0.8"/>
-<geom type="plane" pos="0 0 -1.3" size="3 3 0.1" rgba="0.82 0.84 0.86 1" contype="0" conaffinity="0"/>
+<geom type="plane" pos="0 0 -1.3" size="3 3 0.1" rgba="0.86 0.88 0.91 1" contype="0" conaffinity="0"/>
 <geom type="cylinder" fromto="0 -0.12 0 0 0.12 0" size="0.09" rgba="0.3 0.32 0.36 1" contype="0" conaffinity="0"/>
 <body><joint name="hinge" axis="0 1 0" damping="0.05"/><inertial mass="1" pos="0 0 1" diaginertia="1e-6 1e-6 1e-6"/>
 <geom type="capsule" fromto="0 0 0 0 0 1" size="0.03" rgba="0.49 0.68 0.8 1" contype="0" conaffinity="0"/>

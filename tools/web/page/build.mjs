@@ -24,7 +24,7 @@ const { metafile } = await build({
 const outputs = new Map(Object.entries(metafile.outputs).map(([path, about]) => [relative(out, resolve(path)), about]));
 const first = new Set(["index.html", "main.css", "main.js", "worker.js", "takt.wasm.gz"]);
 for (const name of first) for (const { path, kind } of outputs.get(name)?.imports ?? []) if (kind === "import-statement") first.add(relative(out, resolve(path)));
-cpSync(join(page, "index.html"), join(out, "index.html"));
+cpSync(join(page, "index.html"), join(out, "index.html")); // weighed here, completed below
 // Five percent smaller than gzip's best, for a few seconds; more iterations gain next to nothing.
 writeFileSync(join(out, "takt.wasm.gz"), await promisify(zopfli.gzip)(bare(readFileSync(wasm)), { numiterations: 1 }));
 const weigh = (name) => {
@@ -51,7 +51,11 @@ total += ["live.js", "serial-worker.js", "live.css", "style.css", "index.html", 
 // Results of the examples, and a drive of the robot, so that no panel waits for the machine in the browser.
 mkdirSync(join(out, "ahead"), { recursive: true });
 const call = await asking(readFileSync(wasm));
-const { examples } = call("about");
+const { examples, machines } = call("about");
+// What the menus show first, before a script has filled them.
+const { name: usual } = machines.find(({ name }) => name === shipped(examples[0], PERIODS).machine), html = readFileSync(join(page, "index.html"), "utf8");
+const menus = Object.entries({ example: `${examples[0].name}: ${examples[0].short}`, machine: usual });
+writeFileSync(join(out, "index.html"), menus.reduce((text, [id, first]) => text.replace(`<select id="${id}"></select>`, `<select id="${id}"><option>${first}</option></select>`), html));
 const ahead = (name, data) => {
   const bytes = gzipSync(JSON.stringify(data), { level: 9 });
   writeFileSync(join(out, `ahead/${name}.json.gz`), bytes);

@@ -43,9 +43,12 @@ pub(crate) fn settable(assembled: &AssembledProgram) -> Vec<Value> {
         }
         let from = offsets.units_at(start);
         let to = offsets.units_at(end);
+        // How the source computes a value, such as `0.95/sqrt(3)`: the number alone does not say it.
+        let written = source.text.get(start..end).map(str::trim);
+        let formula = written.filter(|text| text.parse::<f64>().is_err());
         Some(json!({
             "name": name, "value": number.real(), "integer": matches!(number, Number::Int(_)),
-            "from": from, "to": to, "unit": unit, "text": comment,
+            "from": from, "to": to, "unit": unit, "text": comment, "formula": formula,
         }))
     };
     declared.iter().filter_map(of).take(MOST).collect()

@@ -10,6 +10,26 @@ use takt_programs::{EXAMPLES, SOURCES, title};
 
 /// Examples from `programs/examples` that come first in the list, in this order; all others follow.
 const FIRST: [&str; 5] = ["pi.s", "gains.s", "pendulum.s", "foc.s", "blink.s"];
+/// Titles in the menu of examples, where a sentence would not fit.
+const SHORT: [(&str, &str); 12] = [
+    ("biquads.s", "low-pass filter"),
+    ("blink.s", "blinking lamp"),
+    ("foc.s", "motor current"),
+    ("foc_early.s", "motor current, early"),
+    ("gains.s", "motor speed, equations"),
+    ("kalman.s", "Kalman filter"),
+    ("lu.s", "linear equations"),
+    ("pendulum.s", "pendulum on a cart"),
+    ("pi.s", "motor speed, PI"),
+    ("statespace.s", "six masses, state space"),
+    ("table.s", "thermistor, table"),
+    ("tracking.s", "five-axis robot"),
+];
+/// Examples whose periods are problems of their own: no line joins the points of a plot.
+const POINTS: [&str; 1] = ["lu.s"];
+/// Examples that solve `A·x = b` in each period, whose residual is plotted first: names of the matrix, the solution, the right-hand side, and
+/// of the output that is 1 where there is no solution.
+const RESIDUAL_OF: [(&str, [&str; 4]); 1] = [("lu.s", ["A", "x", "b", "singular"])];
 /// Number of periods in which an example without a table shows what it does.
 const PERIODS_OF: [(&str, usize); 6] = [
     ("blink.s", 2000),
@@ -68,6 +88,8 @@ pub(crate) fn about() -> Value {
     let seconds =
         |name: &str| SECONDS_OF.iter().find(|(known, _)| *known == name).map(|(_, seconds)| seconds);
     let plant = |name: &str| PLANT_OF.iter().find(|(known, _)| *known == name).map(|(_, plant)| *plant);
+    let short = |name: &str| SHORT.iter().find(|(known, _)| *known == name).map(|(_, title)| *title);
+    let residual = |name: &str| RESIDUAL_OF.iter().find(|(known, _)| *known == name).map(|(_, ports)| *ports);
     let plotted = |name: &str| PLOTTED_OF.iter().find(|(known, _)| *known == name).map(|(_, ports)| *ports);
     let example = |name: &str| {
         let source = text(name)?;
@@ -76,12 +98,12 @@ pub(crate) fn about() -> Value {
         let inputs = if plant.is_some() { None } else { text(&name.replace(".s", ".csv")) };
         let periods = PERIODS_OF.iter().find(|(known, _)| *known == name).map(|(_, periods)| periods);
         Some(
-            json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "plant": plant.map(|plant| json!({ "name": plant })), "plotted": plotted(name), "track": false }),
+            json!({ "name": name, "title": title(source), "short": short(name), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "plant": plant.map(|plant| json!({ "name": plant })), "plotted": plotted(name), "points": POINTS.contains(&name), "residual": residual(name), "track": false }),
         )
     };
     let mut examples: Vec<Value> = FIRST.into_iter().chain(rest).filter_map(example).collect();
     if let Some((path, source)) = SOURCES.iter().find(|(path, _)| *path == TRACKING) {
-        let tracking = json!({ "name": file_name(path), "title": title(source), "source": source, "inputs": takt_programs::TRACKING_INPUTS, "seconds": seconds(file_name(path)), "track": true });
+        let tracking = json!({ "name": file_name(path), "title": title(source), "short": short(file_name(path)), "source": source, "inputs": takt_programs::TRACKING_INPUTS, "seconds": seconds(file_name(path)), "track": true });
         examples.insert(2.min(examples.len()), tracking);
     }
     json!({

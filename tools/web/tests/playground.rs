@@ -163,6 +163,8 @@ fn every_example_assembles_and_runs() {
     assert_eq!(examples.iter().filter(|example| example["track"] == true).count(), 1);
     for example in examples {
         assert_ne!(example["title"], "", "{}", example["name"]);
+        let short = example["short"].as_str().map(|title| title.chars().count());
+        assert!(short.is_some_and(|count| (1..=25).contains(&count)), "{}: {short:?}", example["name"]);
         let params = json!({
             "name": example["name"], "source": example["source"], "machine": "t3",
             "inputs": example["inputs"].as_str().unwrap_or_default(), "plant": example["plant"],

@@ -91,7 +91,9 @@ fn installation(address: Option<&str>) -> String {
              sudo install takt-{VERSION}-{x86}/takt /usr/local/bin\ntakt track\n```\n"
         ),
         None => format!(
-            "[From source](#from-source), with Rust and nothing else:\n\n```sh\ncargo run --release -- track\n```\n\n\
+            "From source, with Rust and nothing else ([two commands](#from-source)); the second line makes the playground and says how to \
+             open it:\n\n```sh\ncargo run --release -- track     # the main job, in the terminal\n\
+             cargo xtask web                  # the playground, in target/playground\n```\n\n\
              No release is published yet; `cargo xtask release` writes its files:\n{files}.\n"
         ),
     }

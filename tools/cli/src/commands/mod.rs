@@ -16,6 +16,7 @@ pub(crate) mod cosim;
 pub(crate) mod dap;
 pub(crate) mod debug;
 pub(crate) mod disasm;
+pub(crate) mod editor;
 pub(crate) mod eval;
 pub(crate) mod explore;
 pub(crate) mod fmt;

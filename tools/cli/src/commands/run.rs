@@ -228,7 +228,20 @@ impl Run {
         let (program, max_cycles) = (&loaded.program, self.max_cycles);
         let words =
             self.memory.iter().map(|name| memory::words(loaded, name)).collect::<Result<Vec<_>>>()?.concat();
-        Ok(ProgramRun { program, words, emulator, max_cycles, tracer, nans, watch, periods, last: 0, plant })
+        let table = Some(self.file.with_extension("csv")).filter(|table| table.is_file());
+        Ok(ProgramRun {
+            program,
+            words,
+            emulator,
+            max_cycles,
+            tracer,
+            nans,
+            watch,
+            periods,
+            last: 0,
+            plant,
+            table,
+        })
     }
 
     fn of_system<'a, 't>(
@@ -260,6 +273,8 @@ struct ProgramRun<'a, 't> {
     /// Cycles of the last period.
     last: Cycle,
     plant: Option<ProgramLoop>,
+    /// Table of inputs beside the program: the file of its name that ends in `.csv`.
+    table: Option<PathBuf>,
 }
 
 impl ProgramRun<'_, '_> {
@@ -352,7 +367,13 @@ impl<'a> Execution<'a> for ProgramRun<'a, '_> {
         let stop = self.watch.run(&mut self.emulator, self.tracer.as_mut());
         self.nans.add(&self.emulator.take_nan_writes());
         match stop? {
-            Stop::Idle => bail!("the program waits for the tick: give it periods with --inputs or --periods"),
+            Stop::Idle => {
+                let table = self.table.as_ref();
+                let beside = table.map_or(String::new(), |table| {
+                    format!(", such as `--inputs {}`, which lies beside it", table.display())
+                });
+                bail!("the program waits for the tick: give it periods with --inputs or --periods{beside}")
+            }
             _ => Ok(()),
         }
     }

@@ -143,9 +143,12 @@ impl<'a> CoreOutcome<'a> {
     fn line(&self, out: &mut impl Write) -> Result<()> {
         let (machine, count, cycles) = (self.program.machine.name, self.periods.count, self.account.cycles);
         let (periods, each) = if count == 1 { ("period", "cycles") } else { ("periods", "cycles each") };
-        let took = if count == 0 { String::new() } else { format!("{} {each}, ", self.cycles()) };
+        // All cycles together contain those before the first period and the waits for the tick: beside the cycles of a period they
+        // would not add up.
+        let took =
+            if count == 0 { format!("{cycles} cycles in all") } else { format!("{} {each}", self.cycles()) };
         let missed = self.missed;
-        write!(out, "{count} {periods} on {machine}: {took}{cycles} in all, {missed} deadlines missed")?;
+        write!(out, "{count} {periods} on {machine}: {took}, {missed} deadlines missed")?;
         if self.periods.skipped > 0 {
             write!(out, ", snapshots skipped at {} ticks", self.periods.skipped)?;
         }

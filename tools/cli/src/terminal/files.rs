@@ -29,8 +29,11 @@ pub(crate) fn input_name(path: &Path) -> String {
     if is_dash(path) { "standard input".to_owned() } else { path.display().to_string() }
 }
 
-/// Suffix for the message about a file that is not there: one of a similar name in the folder, or the shipped example of the name, or an
-/// example, where there are some.
+/// Number of files that a message names at most.
+const NAMED: usize = 6;
+
+/// Suffix for the message about a file that is not there: one of a similar name in the folder, or the shipped example of the name, or the
+/// files of the same kind in the folder, or among the examples.
 fn near(path: &Path) -> String {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let Some(wanted) = path.file_name() else { return String::new() };
@@ -42,9 +45,30 @@ fn near(path: &Path) -> String {
     let mut examples = [example.clone(), example.with_extension("s")].into_iter();
     match alike.or_else(|| examples.find(|example| example.exists())) {
         Some(meant) => format!("; did you mean `{}`?", meant.display()),
-        None if Path::new(EXAMPLES).is_dir() => format!("; examples are in {EXAMPLES}"),
-        None => String::new(),
+        None => {
+            let kind = |folder: &Path| of_kind(folder, path).map(|files| (folder.to_owned(), files));
+            match kind(folder).or_else(|| kind(Path::new(EXAMPLES))) {
+                Some((folder, files)) if folder == Path::new(".") => {
+                    format!("; in this folder there are {files}")
+                }
+                Some((folder, files)) => format!("; {} has {files}", folder.display()),
+                None => String::new(),
+            }
+        }
     }
+}
+
+/// Names of the files in a folder that end as a path does, by the alphabet.
+fn of_kind(folder: &Path, path: &Path) -> Option<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let alike = entries.filter(|entry| entry.extension() == path.extension() && entry.is_file());
+    let mut names: Vec<String> =
+        alike.filter_map(|entry| Some(entry.file_name()?.to_string_lossy().into_owned())).collect();
+    names.sort();
+    let more = names.len().saturating_sub(NAMED);
+    names.truncate(NAMED);
+    let list = names.join(", ");
+    if list.is_empty() { None } else { Some(if more > 0 { format!("{list} and {more} more") } else { list }) }
 }
 
 /// Opens an input file.

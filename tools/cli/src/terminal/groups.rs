@@ -13,11 +13,13 @@ const GROUPS: [(&str, &[&str]); 7] = [
     ("Put it on a circuit or a board", &["board", "load", "live", "cosim", "rtl"]),
     ("Choose or make a machine", &["machines", "explore"]),
     ("Drive the robots that come with Takt", &["track", "robot", "arm"]),
-    ("Connect simulators, editors and shells", &["fmu", "lsp", "dap", "completions", "man", "help"]),
+    (
+        "Connect simulators, editors and shells",
+        &["fmu", "editor", "lsp", "dap", "completions", "man", "help"],
+    ),
 ];
-/// Columns before a command's purpose, and width of the list where no terminal has one.
+/// Columns before a command's purpose.
 const BESIDE: usize = 15;
-const WIDTH: usize = 100;
 
 /// Text of a command's purpose: the first line of its help.
 fn purpose(command: &Command, name: &str) -> String {
@@ -28,8 +30,7 @@ fn purpose(command: &Command, name: &str) -> String {
 /// Makes the list of commands one by groups.
 pub(crate) fn grouped(command: Command, page: Page) -> Command {
     let indent = " ".repeat(BESIDE);
-    let width = page.width.map_or(WIDTH, |width| width.min(WIDTH));
-    let options = Options::new(width).subsequent_indent(&indent);
+    let options = Options::new(page.columns()).subsequent_indent(&indent);
     let row = |name: &&str| {
         let beside = BESIDE - 2;
         textwrap::wrap(&format!("  {name:<beside$}{}", purpose(&command, name)), &options).join("\n")

@@ -13,6 +13,10 @@ const BOLD: (&str, &str) = ("\x1b[1m", "\x1b[0m");
 /// Minimum width of a comment beside an example, in columns.
 const BESIDE: usize = 24;
 
+/// Width of help on a page without a width, and its largest: longer lines are hard to read.
+const HELP: usize = 100;
+const LONGEST: usize = 110;
+
 /// Format of printed results.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Page {
@@ -28,6 +32,19 @@ impl Page {
         let refused = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
         Page { width: width.filter(|_| is_terminal), is_bold: colors.unwrap_or(is_terminal && !refused) }
+    }
+
+    /// Format of help: as wide as the terminal, or, in a pipe, as the environment's `COLUMNS`.
+    pub(crate) fn of_help() -> Page {
+        let page = Page::of_stdout(None);
+        let stated = || std::env::var("COLUMNS").ok()?.parse().ok().filter(|columns| *columns > 0);
+        let width = page.width.or_else(stated).unwrap_or(HELP).min(LONGEST);
+        Page { width: Some(width), ..page }
+    }
+
+    /// Width in columns, also of a page that folds no lines.
+    pub(crate) fn columns(self) -> usize {
+        self.width.unwrap_or(HELP)
     }
 
     /// Format of messages on standard error.

@@ -10,8 +10,8 @@ use takt_asm::schedule::BlockReport;
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// Maximum number of cycles listed for a line; if there are more, only the first and the last are shown.
-const LISTED: usize = 4;
+/// Maximum number of operations listed for a line; of more, the first and the last cycle are shown, so that the text beside stays in sight.
+const LISTED: usize = 2;
 /// Maximum number of operations explained for a line.
 const EXPLAINED: usize = 12;
 
@@ -19,7 +19,7 @@ const EXPLAINED: usize = 12;
 pub(crate) struct Hint {
     /// Line number, from 0.
     pub(crate) line: u32,
-    /// Cycles, slots, and causes of delay: `12 · mul, waits 4 for l1d`.
+    /// Cycles, slots, and delay: `12 · mul, stalls 4`.
     pub(crate) text: String,
     /// Details, one line per operation.
     pub(crate) more: String,
@@ -90,16 +90,17 @@ fn short(counted: &CountedProgram, words: &[Word]) -> String {
     let mut text = if words.len() <= LISTED {
         words.iter().filter_map(shown).collect::<Vec<_>>().join(", ")
     } else {
+        let cycle = |(address, _): &Word| Some(cycle(program, issue(counted, *address)?));
         let ends = [words.first(), words.last()];
-        let ends: Vec<String> = ends.into_iter().flatten().filter_map(shown).collect();
+        let ends: Vec<String> = ends.into_iter().flatten().filter_map(cycle).collect();
         format!("{} ({} operations)", ends.join(" … "), words.len())
     };
-    // A single operation shares the delay of its bundle.
+    // A single operation shares the delay of its bundle, whose cause is among the details.
     if let [(address, _)] = words
         && let Some(issue) = issue(counted, *address)
-        && let Some(&(cause, cycles)) = issue.stalls.iter().max_by_key(|(_, cycles)| *cycles)
+        && let Some(cycles) = issue.stalls.iter().map(|(_, cycles)| *cycles).max()
     {
-        let _ = write!(text, ", stalls {cycles}: {}", program.cause_text(cause));
+        let _ = write!(text, ", stalls {cycles}");
     }
     text
 }

@@ -81,12 +81,13 @@ export class Comparison {
     };
     this.sides = [side(), side()];
     this.pipelines = [new Pipeline(this.sides[0].box, () => {}), new Pipeline(this.sides[1].box, reveal)];
+    this.legend = node("div", { className: "tp-legend compare-legend" });
     this.all = node("input", { type: "checkbox" });
     this.all.addEventListener("change", () => this.rows());
     this.total = node("p", { className: "compare-total", textContent: "Assembling the other side …" });
     this.table = node("table", { className: "compare-lines" });
     const head = node("p", {}, "Cycles by line ", node("label", {}, this.all, " equal lines, too"));
-    parent.replaceChildren(this.total, node("div", { className: "compare-sides" }, ...this.sides.map(({ element }) => element)), head, node("div", { className: "compare-scroll" }, this.table));
+    parent.replaceChildren(this.total, node("div", { className: "tp" }, this.legend), node("div", { className: "compare-sides" }, ...this.sides.map(({ element }) => element)), head, node("div", { className: "compare-scroll" }, this.table));
   }
 
   /** Shows two sides: `title`, `name` and `source` of the text, `picture`. */
@@ -99,6 +100,10 @@ export class Comparison {
       this.sides[i].box.style.height = `${Math.min(TALL, CHROME + ROW * rows)}px`;
       this.pipelines[i].show(side.picture);
     }
+    // One legend for both: counts differ, colours do not.
+    const named = (entry) => entry.textContent.replace(/ (\d+|\([^)]*\))$/, "");
+    const entries = new Map(this.pipelines.flatMap(({ legend }) => [...legend.children].map((entry) => [named(entry), entry])));
+    this.legend.replaceChildren(...[...entries].map(([name, entry]) => node("span", {}, entry.querySelector("i").cloneNode(), name)));
     // One scale for both: equal lengths are equal times.
     const width = Math.min(...this.pipelines.map((one) => one.width || Infinity));
     for (const one of this.pipelines) Object.assign(one, { width, fits: "" }).resize();

@@ -29,6 +29,8 @@ export class Drive {
 
   draw() {
     this.robot.draw();
+    // A replay begins when somebody sees it.
+    if (this.waits) this.starts();
   }
 
   /** Dims the result of an earlier program's drive. */
@@ -45,14 +47,20 @@ export class Drive {
   /** Sets, before the first drive, whether the program can drive the robot. */
   set fits(on) {
     if (!this.idle) return;
-    el("drive").disabled = el("scene").hidden = !on;
+    this.offers(on);
     if (on) this.prepare(false);
     el("drove").replaceChildren(on ? "The program as the controller of the five-axis hybrid robot, in a closed loop." : "This program has other ports than a controller of the five-axis hybrid robot. The example ");
     if (!on) el("drove").append(Object.assign(document.createElement("a"), { href: "#example=tracking.s", textContent: "tracking.s" }), " is one.");
   }
 
+  /** Shows the panel's controls if there is something to drive. */
+  offers(on) {
+    el("drive").hidden = el("scene").hidden = el("time").parentElement.hidden = !on;
+  }
+
   /** Discards the drive. */
   clear() {
+    this.waits = false;
     this.tried = this.driving = this.built = false;
     this.drives = (this.drives ?? 0) + 1;
     this.robot.play(false);
@@ -76,7 +84,8 @@ export class Drive {
       this.robot.begin(drive.base, drive.sample_time, drive.poses);
       if (!whole) return this.robot.draw();
       this.tried = this.built = true;
-      el("drive").disabled = el("scene").hidden = false;
+      this.offers(true);
+      this.robot.over = false;
       this.starts();
       this.robot.add(drive.poses);
       this.tells(drive, "driven when this page was built");
@@ -125,6 +134,7 @@ export class Drive {
       if (mine !== this.drives) return;
       if (begin) {
         robot.begin(part.base, part.sample_time, robot.plan);
+        robot.over = false;
         this.starts();
       }
       robot.add(part.poses);
@@ -137,10 +147,10 @@ export class Drive {
   }
 
   starts() {
-    this.robot.over = false;
-    this.robot.play(true);
+    this.waits = el("robot").hidden;
+    this.robot.play(!this.waits);
     el("play").hidden = false;
-    el("play").textContent = "Pause";
+    el("play").textContent = this.waits ? "Play" : "Pause";
     el("time").disabled = false;
   }
 

@@ -16,7 +16,7 @@ import { REPLACED, Stopped } from "./thread.js";
 
 /** Pauses of the user after which the program is read, and after which it is scheduled; ms. */
 const PAUSE = 60, LONG_PAUSE = 350;
-/** Time limit for an answer, after which the server is restarted; ms. */
+/** Time limit for an answer, after which the server is stopped; twice as long whenever somebody asks again; ms. */
 export const LANGUAGE_LIMIT = 20_000;
 
 /** Distance of the debugger's line from the editor's edges in pixels. */
@@ -68,8 +68,9 @@ class Hint extends WidgetType {
     if (this.more) element.title = this.more;
     return element;
   }
+  // A click on a hint puts the cursor into its line, as one on the text would.
   ignoreEvent() {
-    return true;
+    return false;
   }
 }
 
@@ -197,15 +198,18 @@ export class Editor {
    * @param parent element that receives the editor
    * @param thread worker of the language server
    * @param told called with an error message
+   * @param late called with the seconds after which the server was stopped
+   * @param diagnosed called with the mistakes of the text: `line` and `message`
    * @param changed called after a change of the text
    * @param stopped called with a line whose breakpoint is to be toggled
    * @param showFile called with the name of another file; returns the view that shows it, if any
    * @param moved called with the new line of the cursor
    */
-  constructor(parent, { thread, told, changed, stopped, showFile, moved }) {
-    Object.assign(this, { thread, told, showFile });
+  constructor(parent, { thread, told, late, diagnosed, changed, stopped, showFile, moved }) {
+    Object.assign(this, { thread, told, late, tellsMistakes: diagnosed, showFile });
     this.stopped = stopped;
     this.server = new Compartment();
+    this.limit = LANGUAGE_LIMIT;
     this.version = 0;
     this.scheduled = 0;
     /** Places of the constants' values by name; they move with the text. */
@@ -269,7 +273,7 @@ export class Editor {
 
   /** Opens a text under a name, for a machine. */
   async open(name, text, machine) {
-    Object.assign(this, { name, machine });
+    Object.assign(this, { name, machine, limit: LANGUAGE_LIMIT });
     this.columns.clear();
     this.close();
     this.view.dispatch({ changes: { from: 0, to: this.view.state.doc.length, insert: text }, selection: { anchor: 0 } });
@@ -304,7 +308,7 @@ export class Editor {
 
   async connected() {
     const client = new LSPClient({
-      timeout: LANGUAGE_LIMIT,
+      timeout: this.limit,
       notificationHandlers: {
         "textDocument/publishDiagnostics": (_, params) => this.diagnosed(params),
         "window/logMessage": (_, params) => (this.told(params.message), true),
@@ -349,10 +353,10 @@ export class Editor {
   /** Calls the worker; restarts it after a timeout. */
   async ask(method, params) {
     const limit = setTimeout(() => {
-      this.told(`The language server took more than ${LANGUAGE_LIMIT / 1000} s over this text and was begun again; it goes on when the text changes.`);
-      this.thread.stop();
       this.lost = true;
-    }, LANGUAGE_LIMIT);
+      this.late(this.limit / 1000);
+      this.thread.stop();
+    }, this.limit);
     try {
       return await this.thread.call(method, params);
     } finally {
@@ -363,15 +367,18 @@ export class Editor {
   later() {
     clearTimeout(this.pause);
     clearTimeout(this.longPause);
-    if (this.lost) {
-      this.lost = false;
-      this.close();
-      this.connect();
-      return;
-    }
+    if (this.lost) return void this.again();
     if (!this.client) return;
     this.pause = setTimeout(() => this.read(), PAUSE);
     this.longPause = setTimeout(() => this.count(), LONG_PAUSE);
+  }
+
+  /** Begins again with a server that was stopped; `patient`: with more time. */
+  again(patient) {
+    this.lost = false;
+    if (patient) this.limit *= 2;
+    this.close();
+    return this.connect();
   }
 
   /** Fetches results that need no scheduling: diagnostics and colours. */
@@ -439,6 +446,7 @@ export class Editor {
       this.view.dispatch(setDiagnostics(this.view.state, diagnostics));
     };
     show(() => []);
+    this.tellsMistakes(params.diagnostics.filter(({ severity }) => (severity ?? 1) === 1).map(({ range, message }) => ({ line: range.start.line + 1, message: message.split("\n")[0] })));
     if (params.diagnostics.length) this.fixes(params, show);
     return true;
   }
@@ -471,7 +479,8 @@ export class Editor {
     const markers = exists(line) ? RangeSet.of(arrow.range(doc.line(line).from)) : RangeSet.empty;
     const effects = [setPlace.of({ lines: Decoration.set(lines, true), markers })];
     this.view.dispatch({ effects });
-    if (!exists(line)) return;
+    // Until somebody steps, the text is to be read from its beginning.
+    if (!exists(line) || !document.body.classList.contains("steps")) return;
     // Only the editor scrolls: on a telephone, the page stays at the picture above.
     const { scrollDOM } = this.view, block = this.view.lineBlockAt(doc.line(line).from), { scrollTop, clientHeight } = scrollDOM;
     if (block.top < scrollTop + MARGIN) scrollDOM.scrollTop = block.top - MARGIN;

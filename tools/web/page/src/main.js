@@ -26,7 +26,7 @@ let machine, editor, plots, pipeline, drive, documents, tuning, parameters, plan
 /** Panels that are loaded when they are asked for, and the worker of the program that the comparison is with. */
 let code, picture, comparison, other;
 
-/** Shows an error; with `act` (text and action of a button), a notice. */
+/** Shows an error; with `act` (text and action of a button), a notice without alarm. */
 function notice(message, act) {
   el("notice").replaceChildren(message ?? "");
   if (act) el("notice").append(" ", Object.assign(document.createElement("button"), { textContent: act[0], onclick: () => (notice(), act[1]()) }));
@@ -35,6 +35,11 @@ function notice(message, act) {
   el("notice").append(close);
   el("notice").classList.toggle("told", Boolean(act));
   el("notice").hidden = !message;
+}
+
+/** Says that the editor's hints are missing because the language server was too slow; the program itself is not concerned. */
+function late(seconds) {
+  notice(`Cycles and mistakes beside the lines are not here yet: reading this text took more than ${seconds} s.`, ["Try again", () => editor.again(true)]);
 }
 
 /** Fills a table with rows; cells are texts, or objects with class and title. */
@@ -125,6 +130,8 @@ async function light() {
   if (!el("machine-box").open || state.tab !== "step" || !state.program?.view || state.ahead) return;
   const { MachinePicture } = await import("./machine.js");
   picture ??= new MachinePicture(el("machine-picture"));
+  // The machine may have been stopped while the panel was loaded.
+  if (state.stale) return;
   try {
     const activity = await machine.call("activity");
     picture.show(activity.machine, activity);
@@ -171,7 +178,7 @@ function changed(event) {
     plots.before = null;
   }
   // A reported mistake also belongs to the previous text.
-  el("cycles").classList.remove("now");
+  el("cycles").className = "";
   if (!state.opening) {
     state.dirty = true;
     // An example remains the example on another machine.
@@ -190,10 +197,10 @@ function changed(event) {
 /** Computes the results of a slider: each at once, or, if they take long, that of the slider's rest. */
 function follow() {
   if (state.took > SOON) {
-    state.soon = setTimeout(() => (machine.busy && machine.stop(REPLACED), assemble(false)), PAUSE);
+    state.soon = setTimeout(() => (machine.busy && machine.stop(REPLACED), assemble()), PAUSE);
   } else if (!state.following) {
     state.following = true;
-    assemble(false).finally(() => {
+    assemble().finally(() => {
       state.following = false;
       if (state.stale && state.tuning) follow();
     });
@@ -206,7 +213,7 @@ function again() {
   if (machine.busy && !drive.driving) state.soon = setTimeout(again, PAUSE);
   else {
     if (machine.busy) machine.stop(REPLACED);
-    assemble(false);
+    assemble();
   }
 }
 
@@ -288,7 +295,8 @@ async function open({ name, source, inputs, periods, plant, parameters, changes,
   document.body.classList.toggle("steps", ["step", "code"].includes(state.tab));
   // The menu says which example is open, and offers it again.
   const example = state.about.examples.find((one) => one.name === state.name && one.source === source);
-  el("example").options[0].textContent = example ? `${example.name}: ${example.title}` : "open one …";
+  el("example").options[0].textContent = example ? `${example.name}: ${example.short}` : "open one …";
+  el("example").title = example?.title ?? "Programs that come with Takt";
   const opened = editor.open(state.name, source, el("machine").value);
   changed("later");
   state.opening = false;
@@ -307,9 +315,31 @@ const isShipped = (example, wanted) => JSON.stringify(shipped(example, PERIODS))
 /** The build has driven the robot with this program. */
 const isDriven = (wanted) => state.about.examples.some((one) => one.track && isShipped(one, wanted));
 
+/** Seconds that assembling has taken, beside those that it usually takes. */
+function elapsed(now, usual) {
+  if (!now) return usual ? `, about ${usual} s` : "";
+  return !usual ? `, ${now} s` : now <= usual ? `, ${now} of about ${usual} s` : `, ${now} s, longer than the usual ${usual} s`;
+}
+
+/** Counts the seconds of assembling, wherever the page says that it assembles; returns what ends the count. */
+function countSeconds() {
+  const begun = performance.now(), usual = seconds();
+  const timer = setInterval(() => {
+    const now = Math.floor((performance.now() - begun) / 1000);
+    for (const one of document.querySelectorAll(".elapsed")) one.textContent = elapsed(now, usual);
+  }, 1000);
+  return () => clearInterval(timer);
+}
+
+/** A text that ends with the seconds of assembling; they are not read aloud each second. */
+function assembling(start) {
+  const counted = Object.assign(document.createElement("span"), { className: "elapsed", ariaLive: "off", textContent: elapsed(0, seconds()) });
+  return [start, counted, " …"];
+}
+
 /** Empties all panels until the result of the opened text is there. */
 function empty() {
-  const known = seconds(), why = `Assembling ${state.name}${known ? `, about ${known} s` : ""} …`;
+  const why = () => assembling(`Assembling ${state.name}`);
   state.shown = state.program = state.run = state.drawn = state.coded = null;
   state.ahead = false;
   document.body.classList.remove("stale");
@@ -320,11 +350,12 @@ function empty() {
   el("loop").hidden = true;
   plots.clear(why);
   pipeline.show(null);
-  clearView(why);
+  clearView();
   for (const id of ["ran", "fault", "text", "answer"]) el(id).textContent = "";
-  el("cycles").replaceChildren(why);
+  showMistake();
+  for (const id of ["cycles", "head", "drawn"]) el(id).replaceChildren(...why());
+  el("cycles").className = "";
   el("more").hidden = true;
-  el("drawn").textContent = why;
 }
 
 /** Key of the times that assembling took here. */
@@ -356,18 +387,43 @@ function took(milliseconds) {
   }
 }
 
+/** Shows why there is no new result above the panel, which keeps the result of the text before; without `why`, hides the reason. */
+function showMistake(why, text) {
+  el("mistake").hidden = !why;
+  el("mistake-why").textContent = [why, why && state.shown && "Below is the result of the text before."].filter(Boolean).join(" ");
+  el("mistake-text").textContent = text ?? "";
+}
+
+/** Says in the summary that the text does not assemble, and why: figures of the text before are not to stand beside a mistake. `by`: who found it. */
+function showWrong(first, more, by) {
+  const out = el("cycles");
+  out.className = by;
+  out.replaceChildren(Object.assign(document.createElement("b"), { textContent: "does not assemble" }), first ? `: ${first}${more ? ` (${more} more in Messages)` : ""}` : ": see Messages");
+  el("more").hidden = true;
+}
+
+/** Takes notice of the editor's mistakes, which are known before the text is assembled. */
+function diagnosed(mistakes) {
+  if (!state.stale || state.opening || state.ahead) return;
+  if (mistakes.length) showWrong(`line ${mistakes[0].line}: ${mistakes[0].message}`, mistakes.length - 1, "early");
+  // The mistake is gone, the text is still to be assembled.
+  else if (state.shown && !state.tuning) {
+    showCycles(state.shown);
+    showMistake();
+  }
+}
+
 /** Shows cycles and bound in the summary, which is always visible. */
-function showCycles() {
-  const { program, run } = state, out = el("cycles");
+function showCycles(program = state.program) {
+  const { run } = state, out = el("cycles");
   out.replaceChildren();
   el("more").hidden = true;
-  out.classList.toggle("now", Boolean(program) && (!program.assembled || Boolean(program.inputs_error)));
+  out.className = program?.inputs_error ? "now" : "";
   const put = (content, tag) => out.appendChild(Object.assign(document.createElement(tag ?? "span"), { textContent: content }));
   if (!program) return put("no program");
   if (!program.assembled) {
     const [first] = program.messages ?? [], at = first?.places?.[0];
-    put("does not assemble", "b");
-    return put(first ? `: ${at ? `${at.file === state.name ? "" : `${at.file} `}line ${at.line}: ` : ""}${first.message}${program.messages.length > 1 ? ` (${program.messages.length - 1} more in Messages)` : ""}` : ": see Messages");
+    return showWrong(first && `${at ? `${at.file === state.name ? "" : `${at.file} `}line ${at.line}: ` : ""}${first.message}`, program.messages.length - 1, "now");
   }
   if (program.inputs_error) return put(`The inputs cannot be read: ${program.inputs_error}`, "b");
   const range = ({ best, worst }) => (best === worst ? `${best.toLocaleString("en")}` : `${best.toLocaleString("en")} to ${worst.toLocaleString("en")}`);
@@ -403,6 +459,7 @@ function showProgram(program) {
   const others = program.inputs_of_others && `The table of inputs is for other ports, and is not read: ${program.inputs_of_others}`;
   el("text").textContent = [wrong && `error: ${wrong}`, open, others, program.text].filter(Boolean).join("\n\n") || "No errors, no warnings.";
   el("tab-messages").classList.toggle("bad", !whole);
+  showMistake(wrong ? "The inputs cannot be read." : whole ? "" : "The text does not assemble.", el("text").textContent);
   el("wait").hidden = true;
   clearTimeout(state.dims);
   document.body.classList.toggle("stale", !whole && state.shown !== null);
@@ -487,12 +544,12 @@ function act() {
 function showPlants() {
   const { plants } = state.program, here = plants.find(({ name }) => name === state.plant?.name), choice = el("plant-name");
   el("loop").hidden = !plants.length;
-  choice.replaceChildren(...plants.map(({ name, text, gives }) => new Option(`${text} gives ${gives.join(", ")}`, name)), new Option("all inputs are the table's", ""));
+  choice.replaceChildren(...plants.map(({ name, text, gives }) => new Option(`${text}: ${gives.join(", ")}`, name)), new Option("the table alone, without a plant", ""));
   choice.value = here?.name ?? "";
   el("given").textContent = here ? `${here.text[0].toUpperCase()}${here.text.slice(1)} gives ${here.gives.join(", ")}: a table's columns of these names are not read.` : "";
   // What the program takes the plant for stands apart from its gains, and from the plant's own numbers.
   const own = new Set(here?.parameters.map(({ name }) => name)), isModel = ({ name }) => own.has(name), { settable } = state.program;
-  tuning.show([...settable.filter((one) => !isModel(one)), ...settable.filter(isModel).map((one) => ({ ...one, under: "what the program takes the plant for; the plant's own numbers stand below" }))]);
+  tuning.show([...settable.filter((one) => !isModel(one)), ...settable.filter(isModel).map((one) => ({ ...one, under: "the program's model of the plant; the plant's own numbers are under Plant" }))]);
   plant.show((here?.parameters ?? []).map((one) => ({ ...one, value: state.plant.parameters?.[one.name] ?? one.value, integer: true })));
 }
 
@@ -522,9 +579,7 @@ async function showAhead(wanted, isOver) {
     showParameters();
     showPlants();
     tuning.enabled = parameters.enabled = plant.enabled = false;
-    const about = seconds(), later = `assembling it here${about ? `, about ${about} s` : ""} …`;
-    el("cycles").append(` · ${later}`);
-    el("head").append(` · ${later}`);
+    for (const id of ["cycles", "head"]) el(id).append(...assembling(" · assembling it here"));
     drawAhead();
     codeInStep();
   } catch {
@@ -532,8 +587,11 @@ async function showAhead(wanted, isOver) {
   }
 }
 
-/** A program with what the page knows: whether there is a table, and the ports that are plotted first. */
-const known = (program, wanted) => Object.assign(program, { blank: !wanted.inputs.trim(), plotted: state.about.examples.find(({ name }) => name === wanted.name)?.plotted });
+/** A program with what the page knows: whether there is a table, the ports that are plotted first, and whether their values are single points or have a residual. */
+function known(program, wanted) {
+  const { plotted, points, residual } = state.about.examples.find(({ name }) => name === wanted.name) ?? {};
+  return Object.assign(program, { blank: !wanted.inputs.trim(), plotted, points, residual });
+}
 
 /** Shows the build's diagram, if it is of the period that is asked for. */
 function drawAhead() {
@@ -546,10 +604,10 @@ function drawAhead() {
 /** Assembles the program, and restores the breakpoints. */
 async function begin() {
   const { version } = editor, { opens } = state;
-  const wanted = asked(), answer = machine.call("assemble", wanted);
+  const wanted = asked(), answer = machine.call("assemble", wanted), counted = countSeconds();
   let over = false;
   showAhead(wanted, () => over);
-  const program = known(await answer.finally(() => (over = true)), wanted);
+  const program = known(await answer.finally(() => (counted(), (over = true))), wanted);
   if (opens !== state.opens) throw new Stopped(REPLACED);
   if (state.ahead && program.assembled) {
     // What the build has drawn is of this program.
@@ -585,8 +643,8 @@ async function work(doing) {
   }
 }
 
-/** Assembles and runs; `told`: the user requested it, so report obstacles. */
-const assemble = (told = true) => work(async () => {
+/** Assembles and runs. */
+const assemble = () => work(async () => {
   const begun = performance.now();
   clearTimeout(state.soon);
   if (drive.driving) machine.stop(REPLACED);
@@ -595,7 +653,7 @@ const assemble = (told = true) => work(async () => {
   await begin();
   keep();
   const { program } = state;
-  if (!program.assembled || program.inputs_error) return told && select("messages");
+  if (!program.assembled || program.inputs_error) return;
   await run();
   took(performance.now() - begun);
 }).then(() => (pipelineInStep(), codeInStep(), driveFirst()));
@@ -605,16 +663,14 @@ async function current() {
   if (!state.stale && state.program?.assembled && !state.program.inputs_error) return true;
   state.stale = false;
   await begin();
-  if (!state.program.assembled || state.program.inputs_error) {
-    select("messages");
-    return false;
-  }
-  return true;
+  return state.program.assembled && !state.program.inputs_error;
 }
 
 async function run() {
   const whole = await collect((method, params) => machine.call(method, params), periods(), (part) => {
-    el("ran").textContent = `${plural(part.done, "period")}${part.all > part.done ? ` of ${part.all.toLocaleString("en")}` : ""}, ${plural(part.total, "cycle")}, ${plural(part.operations, "operation")}; flags: ${part.flags}${part.halted ? "; halted" : ""}${part.nan_writes ? `; ${plural(part.nan_writes, "NaN")} written to ports` : ""}`;
+    // All cycles together contain what runs once and the waits for the tick: beside the cycles of a period they would not add up.
+    const ran = part.all ? `${plural(part.done, "period")}${part.all > part.done ? ` of ${part.all.toLocaleString("en")}` : ""}` : plural(part.total, "cycle");
+    el("ran").textContent = `${ran}, ${plural(part.operations, "operation")}; flags: ${part.flags}${part.halted ? "; halted" : ""}${part.nan_writes ? `; ${plural(part.nan_writes, "NaN")} written to ports` : ""}`;
     el("fault").textContent = text(part.fault);
     if (part.fault) select("plot");
   });
@@ -627,7 +683,7 @@ async function run() {
 
 // ---- Stepping.
 
-function clearView(message) {
+function clearView(message = "") {
   el("head").textContent = message;
   for (const id of ["bundle", "registers", "ports", "flight", "stalls"]) rows(id, []);
   editor.stand(0);
@@ -876,11 +932,11 @@ async function start() {
   pipeline = new Pipeline(el("pipeline-picture"), reveal);
   drive = new Drive({ machine, work, current });
   tuning = new Tuning(el("tuning"), { begins: (differs) => plots.keep(differs), sets: (texts) => editor.tune(texts), textOf: (name) => editor.valueOf(name) });
-  editor = new Editor(el("source"), { thread: language, told: notice, changed, stopped: toggleStop, showFile, moved: (line) => markPipeline(line, true) });
+  editor = new Editor(el("source"), { thread: language, told: notice, late, diagnosed, changed, stopped: toggleStop, showFile, moved: (line) => markPipeline(line, true) });
   state.about = await machine.call("about");
   el("machine").replaceChildren(...state.about.machines.map(({ name, text }) => new Option(name, name)), new Option("own…", OWN));
   el("machine").value = "t3";
-  el("example").replaceChildren(new Option("open one …", ""), ...state.about.examples.map(({ name, title }) => new Option(`${name}: ${title}`, name)));
+  el("example").replaceChildren(new Option("open one …", ""), ...state.about.examples.map(({ name, short, title }) => Object.assign(new Option(`${name}: ${short}`, name), { title })));
   rows("keytable", [...KEYS.map(([key, what]) => [key.replace("Mod", "Ctrl"), what]), ...EDITOR_KEYS]);
 
   document.addEventListener("keydown", pressed, true);
@@ -964,6 +1020,7 @@ async function start() {
   // Where there is room, the machine is to be seen.
   el("machine-box").open = innerWidth >= 1100 && innerHeight >= 800;
   select("plot");
+  for (const part of document.querySelectorAll("[inert]")) part.inert = false;
   await openAddress(true);
   document.body.dataset.ready = "";
 }

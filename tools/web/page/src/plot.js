@@ -88,7 +88,8 @@ function heading(curves, look) {
     if (i) head.append(", ");
     if (curves.length > 1) {
       const swatch = document.createElement("i");
-      swatch.style.borderTop = `2px ${look[i].line} ${look[i].colour}`;
+      swatch.style.borderTop = `${curves[i].points ? "6px dotted" : `2px ${look[i].line}`} ${look[i].colour}`;
+      if (curves[i].points) swatch.style.width = "6px";
       head.append(swatch);
     }
     head.append(Object.assign(document.createElement("b"), { textContent: name }));
@@ -102,7 +103,7 @@ function heading(curves, look) {
  * `x`: abscissa values with `name`, `unit`, and optional `label` of the axis. `curves`: each with `name`, `unit`, `values`, optional `limit`
  * and optional values `before`, which are drawn pale; the values `"NaN"`, `"inf"` and `"-inf"` are marked. `lines`: levels with a text.
  * `sync`: key of charts with synchronised cursors. `place` names a point by its index. `picked` is called with the index of a clicked point.
- * `moments`: indices of vertical lines. With `folds`, a chart of horizontal lines is its heading only.
+ * `points` of a curve: its values have nothing to do with one another, so that no line joins them. `moments`: indices of vertical lines. With `folds`, a chart of horizontal lines is its heading only.
  */
 export function chart(parent, { x, name: across, label, unit, curves, lines = [], height = () => 190, sync, picked, moments = [], place, folds }) {
   const axis = { stroke: style("--dim"), grid: { stroke: style("--edge"), width: 0.5 }, ticks: { stroke: style("--edge"), width: 0.5 }, labelSize: 17, labelGap: 0, labelFont: "12px system-ui, sans-serif", font: "11px system-ui, sans-serif" };
@@ -148,10 +149,10 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   const plot = new uPlot({
     width: width(), height: height(), padding: [6, 18, 0, 0], scales: { x: { time: false }, y: { range } },
     axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }) }],
-    legend: { show: false }, cursor: { ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
+    legend: { show: false }, cursor: { y: false, ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
     series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}${style("--pale")}`, width: 1.6, points: { show: false }, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...drawn.map(({ i, ...curve }) => ({
-      label: curve.name, stroke: look[i].colour, width: 1.6, dash: look[i].dash, points: { show: true, filter: () => x.length < 40 ? null : alone(curve.values), size: 4 },
-      ...(curve.stepped && { paths: stepped, stepped: true }),
+      label: curve.name, stroke: look[i].colour, width: 1.6, dash: look[i].dash, points: { show: true, filter: () => x.length < 40 || curve.points ? null : alone(curve.values), size: curve.points ? 6 : 4, ...(curve.points && { fill: look[i].colour }) },
+      ...(curve.points && { paths: () => null, single: true }), ...(curve.stepped && { paths: stepped, stepped: true }),
     }))],
     hooks: { setCursor: [({ cursor: { idx } }) => (at.textContent = idx === null || idx === undefined ? "" : said(idx))], draw: [(plot) => mark(plot.ctx, plot, { x, levels, lost, saturated, moments })] },
   }, [x, ...ghosts.map(({ before }) => column(before)), ...drawn.map(({ values }) => column(values))], element);
@@ -236,6 +237,23 @@ function mark(ctx, plot, { x, levels, lost, saturated, moments }) {
   ctx.restore();
 }
 
+/** Ports that are chosen together, as names and keys: the elements of an array (`y[3]`, `A{i}{j}`), or a port alone. */
+function arrays(facts) {
+  const found = new Map();
+  for (const [key, { name, together }] of facts) {
+    const base = /^([^,[{]+)[[{][^,]*$/.exec(together ?? "")?.[1].trim(), array = base && name.startsWith(base) ? base : name;
+    found.set(array, [...(found.get(array) ?? []), key]);
+  }
+  return [...found].map(([array, keys]) => [keys.length > 1 ? array : facts.get(keys[0]).name, keys]);
+}
+
+/** Largest component of `A·x - b` in each period; `null` where the program says that there is no solution. `ports`: names of `A`, `x`, `b`, and of that output. */
+function residual({ inputs, outputs, cycles }, [matrix, solution, right, none]) {
+  const size = Object.keys(outputs).filter((name) => name.startsWith(solution)).length, all = Array.from({ length: size }, (_, i) => i + 1);
+  const row = (period) => (i) => Math.abs(all.reduce((sum, j) => sum + inputs[`${matrix}${i}${j}`][period] * outputs[`${solution}${j}`][period], 0) - inputs[`${right}${i}`][period]);
+  return cycles.map((_, period) => (outputs[none][period] ? null : Math.max(...all.map(row(period)))));
+}
+
 /** Values of input ports that nobody gives. */
 const rest = ({ resting }) => ["0", ...Object.entries(resting).map(([name, value]) => `${name} ${short(value)} (of its .range nearest to 0)`)].join(", but ");
 
@@ -262,20 +280,25 @@ export class Plots {
     if (this.run) this.before = { ...this.run, differs };
   }
 
-  /** Shows a run: columns of inputs and outputs by name, and cycles. Units and limits come from the program. Without a run, shows `why`. */
+  /** Shows a run: columns of inputs and outputs by name, and cycles. Units and limits come from the program. Without a run, shows `why`: a text, or a function that gives the nodes. */
   show(run, program, why = "") {
     Object.assign(this, { run, program, why });
     // In declaration order.
     const list = (kind, ports) => (ports ?? []).map((port) => [`${kind} ${port.name}`, port]);
     this.facts = new Map(run ? [...list("out", program?.outputs), ...list("in", program?.inputs)] : []);
     const first = this.initial();
-    this.choice.replaceChildren(...[...this.facts].map(([key, { name }]) => {
-      const label = document.createElement("label"), box = document.createElement("input");
+    for (const key of this.facts.keys()) this.chosen.set(key, this.chosen.get(key) ?? first.has(key));
+    this.choice.replaceChildren(...arrays(this.facts).map(([name, keys]) => {
+      const label = document.createElement("label"), box = document.createElement("input"), shown = keys.filter((key) => this.chosen.get(key)).length;
       box.type = "checkbox";
-      box.checked = this.chosen.get(key) ?? first.has(key);
-      this.chosen.set(key, box.checked);
-      box.addEventListener("change", () => (this.chosen.set(key, box.checked), this.draw()));
-      label.append(box, ` ${name}${key.startsWith("in ") ? " (in)" : ""}`);
+      box.checked = shown === keys.length;
+      box.indeterminate = shown > 0 && !box.checked;
+      box.addEventListener("change", () => {
+        for (const key of keys) this.chosen.set(key, box.checked);
+        this.draw();
+      });
+      const notes = [...(keys[0].startsWith("in ") ? ["in"] : []), ...(keys.length > 1 ? [keys.length] : [])];
+      label.append(box, ` ${name}${notes.length ? ` (${notes.join(", ")})` : ""}`);
       return label;
     }));
     this.draw();
@@ -335,7 +358,7 @@ export class Plots {
     for (const [key, { name, unit, limit, together }] of this.facts) {
       if (!this.chosen.get(key)) continue;
       const kind = key.startsWith("out ") ? "outputs" : "inputs", old = before?.[kind][name];
-      const curve = { name, unit, limit, values: run[kind][name] ?? [], ...(old && { before: old }) };
+      const curve = { name, unit, limit, points: this.program.points, values: run[kind][name] ?? [], ...(old && { before: old }) };
       // Ports with a unit share the axis with others of that unit; those without, with what is declared beside them.
       let group = tools.together.value === "each" ? key : unit ?? `${kind}: ${together}`;
       while (groups.get(group)?.length >= TOGETHER) group += " more";
@@ -352,7 +375,12 @@ export class Plots {
     this.charts = [];
     this.parent.replaceChildren();
     const { run, program, before, tools } = this;
-    const say = (why) => why && this.parent.append(Object.assign(document.createElement("p"), { className: "why", textContent: why }));
+    const say = (why) => {
+      if (!why) return;
+      const box = Object.assign(document.createElement("p"), { className: "why" });
+      box.append(...(typeof why === "function" ? why() : [why]));
+      this.parent.append(box);
+    };
     tools.axis.closest(".tools").hidden = !run?.cycles.length;
     if (!run) return say(this.why);
     if (!this.parent.clientWidth) return;
@@ -360,7 +388,8 @@ export class Plots {
     say(this.silence());
     if (before) this.parent.append(Object.assign(document.createElement("p"), { className: "ghost", textContent: `pale: before, with ${before.differs}` }));
     const cycles = [{ name: "cycles", values: run.cycles, stepped: true, ...(before && { before: before.cycles }) }];
-    const all = [...this.groups().map((curves) => ({ curves })), { curves: cycles, lines: this.levels() }];
+    const checks = program.residual && run.inputs[`${program.residual[0]}11`] ? [{ curves: [{ name: "largest |A·x − b|", points: true, values: residual(run, program.residual) }] }] : [];
+    const all = [...checks, ...this.groups().map((curves) => ({ curves })), { curves: cycles, lines: this.levels() }];
     const { label, ...common } = this.abscissa(), open = all.filter(({ curves }) => !isFlat(curves)), last = open.at(-1);
     const height = () => this.height(open.length, all.length - open.length);
     const { from, changes, picked } = this.mark ?? { changes: [] }, moments = [...new Set([...changes.map(({ period }) => period), ...(from > 1 ? [from] : [])])].map((period) => period - 1);

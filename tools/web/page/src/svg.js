@@ -86,7 +86,7 @@ export class Pen {
   curves(plot) {
     const ratio = devicePixelRatio || 1;
     plot.series.slice(1).forEach((series, i) => {
-      const values = plot.data[i + 1], { stepped } = series;
+      const values = plot.data[i + 1], { stepped, single } = series;
       Object.assign(this, { strokeStyle: series.stroke(), fillStyle: series.stroke(), lineWidth: series.width * ratio });
       this.setLineDash((series.dash ?? []).map((one) => one * ratio));
       this.beginPath();
@@ -94,12 +94,12 @@ export class Pen {
       plot.data[0].forEach((value, j) => {
         if (values[j] === null) return (last = null);
         const x = plot.valToPos(value, "x", true), y = plot.valToPos(values[j], "y", true);
-        if (last === null) this.moveTo(x, y);
+        if (last === null || single) this.moveTo(x, y);
         else {
           if (stepped) this.lineTo(x, last);
           this.lineTo(x, y);
         }
-        if (last === null && (values[j + 1] ?? null) === null) this.fillRect(x - 2 * ratio, y - 2 * ratio, 4 * ratio, 4 * ratio);
+        if (single || (last === null && (values[j + 1] ?? null) === null)) this.fillRect(x - 2 * ratio, y - 2 * ratio, 4 * ratio, 4 * ratio);
         last = y;
       });
       this.stroke();

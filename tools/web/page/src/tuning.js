@@ -40,6 +40,7 @@ export class Tuning {
     for (const constant of constants) {
       const row = this.rows.get(constant.name);
       Object.assign(row, { constant });
+      row.formula.textContent = constant.formula ? `= ${constant.formula}` : "";
       if (!this.moving) row.put(constant.value);
     }
     for (const [name, { last }] of this.originals) if (this.textOf(name) !== last) this.originals.delete(name);
@@ -65,8 +66,9 @@ export class Tuning {
     const number = (what, of, className) => node("input", { inputMode: "decimal", value: short(of), className, ariaLabel: `${what} of ${name}` });
     const slider = node("input", { type: "range", ariaLabel: `${name}, slider` });
     const least = number("Least value", low, "end"), most = number("Largest value", high, "end"), field = number("Value", value, "field");
-    const element = node("div", { className: "constant", title: text ?? "" }, node("b", { textContent: name }), least, slider, most, field, node("small", { textContent: unit ?? "" }));
-    const row = { element, slider, least, most, field, constant };
+    const formula = node("code", { className: "formula" });
+    const element = node("div", { className: "constant", title: text ?? "" }, node("b", { textContent: name }), least, slider, most, field, node("small", { textContent: unit ?? "" }), formula);
+    const row = { element, slider, least, most, field, formula, constant };
     const fit = () => {
       const range = Math.abs(most.value - least.value) || 1;
       Object.assign(slider, { min: least.value, max: most.value, step: whole ? 1 : 10 ** (Math.floor(Math.log10(range)) - DIGITS) });

@@ -208,7 +208,7 @@ test("sections fold, and a name leads to the file that declares it", limit, asyn
   await page.waitForSelector(".cm-foldPlaceholder");
   assert.ok((await lines()) < before + 1);
   // robot.s declares `ms`.
-  await page.evaluate(() => takt.goTo(10, 20));
+  await page.evaluate(() => takt.goTo(12, 20));
   await page.keyboard.press("F12");
   await page.waitForSelector("#file-shown[open] .cm-content");
   assert.equal(await page.textContent("#file-name"), "robot.s");
@@ -415,7 +415,7 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   assert.deepEqual([await opacity("#cycles"), await opacity("#text")], [1, 1], "the mistake is that of this text");
   await shot(page, "stale");
   await page.keyboard.type("x");
-  assert.deepEqual([(await opacity("#cycles")) < 0.5, (await opacity("#text")) < 0.5], [true, true], "the mistake is one of the text before");
+  assert.ok((await opacity("#text")) < 0.5, "the message is one of the text before");
   await page.waitForFunction(() => document.getElementById("cycles").classList.contains("now"));
   await page.keyboard.press("Control+a");
   await page.keyboard.insertText(await example("foc.s"));
@@ -433,6 +433,148 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   await page.fill("#table", await example("pi.csv"));
   await page.waitForFunction(() => /the table is not read: inputs: no column for the input ports ia/.test(document.getElementById("cycles").textContent));
   assert.match(await page.textContent("#text"), /table of inputs is for other ports/);
+  assert.deepEqual(errors, []);
+});
+
+test("a mistake leaves the curves where they are, and no figure of the text before stands beside it", limit, async () => {
+  const { page, errors } = await open();
+  await done(page);
+  const shown = () => page.evaluate(() => ({ tab: takt.state.tab, charts: document.querySelectorAll("#charts canvas").length, mistake: getComputedStyle(document.getElementById("mistake")).display !== "none" }));
+  const before = await shown();
+  assert.deepEqual([before.tab, before.charts > 0, before.mistake], ["plot", true, false]);
+  // A long run is not repeated unasked: the editor alone knows of the mistake.
+  await page.evaluate(() => (takt.state.took = 1e6));
+  await page.evaluate(() => takt.goTo(1));
+  await page.keyboard.press("End");
+  await page.keyboard.press("Enter");
+  await page.keyboard.type("  fad e, e, e");
+  await page.waitForFunction(() => /^does not assemble: line 2: .*fad/.test(document.getElementById("cycles").textContent));
+  assert.doesNotMatch(await cycles(page), /38 cycles|proved/);
+  await page.keyboard.press("Control+Enter");
+  await page.waitForFunction(() => !document.getElementById("mistake").hidden);
+  await done(page);
+  assert.deepEqual(await shown(), { ...before, mistake: true }, "the tab and its curves stay");
+  assert.match(await page.textContent("#mistake"), /The text does not assemble\. Below is the result of the text before\..*error\[.*pi\.s:2/s);
+  await shot(page, "mistake-beside-curves");
+  await page.click("#tab-messages");
+  assert.equal((await shown()).mistake, false, "the messages are there anyway");
+  await page.click("#tab-plot");
+  for (let i = 0; i < "  fad e, e, e".length; i++) await page.keyboard.press("Backspace");
+  await page.evaluate(() => takt.goTo(2, 13));
+  for (let i = 0; i < 14; i++) await page.keyboard.press("Backspace");
+  await page.waitForFunction(() => /38 cycles a period/.test(document.getElementById("cycles").textContent));
+  assert.match(await page.evaluate(() => getComputedStyle(document.getElementById("cycles"), "::after").content), /of the text before/);
+  await page.keyboard.press("Control+Enter");
+  await page.waitForFunction(() => !document.body.classList.contains("stale"));
+  await done(page);
+  assert.deepEqual(await shown(), before);
+  assert.deepEqual(errors, []);
+});
+
+test("the seconds of assembling are counted; hints that are late can be asked for again", limit, async () => {
+  // The machine answers late, and the language server not at all until it is asked again; its limit comes sooner.
+  const script = () => {
+    const post = Worker.prototype.postMessage, set = window.setTimeout;
+    window.setTimeout = (act, delay, ...rest) => set(act, delay === 20_000 && window.isDeaf ? 1500 : delay, ...rest);
+    Worker.prototype.postMessage = function (data, ...rest) {
+      if (data?.method === "lsp.check" && window.isDeaf) return;
+      if (data?.method === "assemble" && window.isSlow) set(() => post.call(this, data, ...rest), 3600);
+      else post.call(this, data, ...rest);
+    };
+  };
+  const { page, errors } = await open("", { script });
+  await done(page);
+  await page.evaluate(() => (window.isSlow = true));
+  await page.selectOption("#example", "statespace.s");
+  await page.waitForFunction(() => /482 cycles a period.* · assembling it here, [12] of about 2 s …$/.test(document.getElementById("cycles").textContent));
+  await page.waitForFunction(() => /assembling it here, [3-9] s, longer than the usual 2 s …$/.test(document.getElementById("cycles").textContent));
+  await page.evaluate(() => ([window.isDeaf, window.isSlow] = [true, false]));
+  await page.selectOption("#example", "gains.s");
+  await page.waitForSelector("#notice:visible");
+  assert.match(await page.textContent("#notice"), /^Cycles and mistakes beside the lines are not here yet: reading this text took more than 20 s\. Try again/);
+  assert.ok(await page.evaluate(() => document.getElementById("notice").classList.contains("told")), "it is no alarm");
+  await page.evaluate(() => (window.isDeaf = false));
+  await page.click("#notice button:has-text('Try again')");
+  await page.waitForSelector(".hint");
+  await done(page);
+  assert.doesNotMatch(await cycles(page), /assembling/);
+  assert.deepEqual(errors, []);
+});
+
+test("a click on a hint puts the cursor into its line", limit, async () => {
+  const { page, errors } = await open();
+  await done(page);
+  await page.waitForSelector(".hint");
+  const hint = page.locator(".cm-line:has(.hint)").nth(2);
+  const text = (await hint.textContent()).trim();
+  await hint.locator(".hint").click();
+  assert.equal((await page.locator(".cm-activeLine").textContent()).trim(), text);
+  assert.ok(text.length > 0 && (await page.evaluate(() => document.activeElement.classList.contains("cm-content"))));
+  assert.deepEqual(errors, []);
+});
+
+test("before a script has run, the menus say what opens first, and nothing can be pressed", limit, async () => {
+  const page = await (await browser.newContext({ javaScriptEnabled: false })).newPage();
+  contexts.push(page.context());
+  await page.goto(address);
+  assert.deepEqual([await page.textContent("#example"), await page.textContent("#machine")], ["pi.s: motor speed, PI", "t3"]);
+  assert.equal(await page.locator(":is(header, main)[inert]").count(), 2);
+});
+
+test("titles of the menu are short, with the whole one beside; units and formulas stand at the sliders", limit, async () => {
+  const { page, errors } = await open("#example=foc.s");
+  await done(page);
+  const titles = await page.locator("#example option").evaluateAll((options) => options.slice(1).map(({ textContent, title }) => [textContent.split(": ")[1], title]));
+  for (const [short, whole] of titles) assert.ok(short.length <= 25 && whole.length > short.length, `${short}: ${whole}`);
+  const row = (name) => page.locator("#tuning .constant", { has: page.locator(`b:text-is("${name}")`) });
+  assert.equal(await row("DMAX").locator(".formula").textContent(), "= 0.95/sqrt(3)");
+  assert.equal(await row("Ld").locator("small").textContent(), "H");
+  assert.equal(await row("R").locator(".formula").textContent(), "");
+  await row("DMAX").locator(".field").fill("0.5");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => /DMAX = 0\.5/.test(takt.text) && !takt.state.stale);
+  await done(page);
+  assert.equal(await row("DMAX").locator(".formula").textContent(), "", "a number is no formula");
+  assert.deepEqual(errors, []);
+});
+
+test("a text is shown from its beginning until somebody steps", limit, async () => {
+  const { page, errors } = await open("#example=foc.s", { viewport: { width: 1400, height: 600 } });
+  await done(page);
+  const top = () => page.evaluate(() => document.querySelector("#source .cm-scroller").scrollTop);
+  assert.equal(await top(), 0);
+  await page.keyboard.press("F10");
+  await page.waitForFunction(() => document.querySelector("#source .cm-scroller").scrollTop > 0);
+  assert.deepEqual(errors, []);
+});
+
+test("the elements of an array are chosen together, and single results are points", limit, async () => {
+  const { page, errors } = await open("#example=lu.s");
+  await done(page);
+  const boxes = async () => (await page.locator("#choice label").allTextContents()).map((text) => text.trim());
+  assert.deepEqual(await boxes(), ["x (4)", "singular", "A (in, 16)", "b (in, 4)"]);
+  assert.match(await page.locator(".chart-head").first().textContent(), /^largest \|A·x − b\|/);
+  await page.click("#choice label:has-text('x (4)') input");
+  assert.ok(!(await page.locator(".chart-head").allTextContents()).some((text) => /x1/.test(text)));
+  await page.click("#choice label:has-text('x (4)') input");
+  const [download] = await Promise.all([page.waitForEvent("download"), page.click("#plot-svg")]);
+  const svg = (await readFile(await download.path())).toString();
+  assert.ok((svg.match(/<rect [^>]*fill="#2f6fbf"/g) ?? []).length >= 50, "points");
+  await shot(page, "points");
+  assert.deepEqual(errors, []);
+});
+
+test("on a telephone a finger finds the buttons, and the whole pipeline is in sight", limit, async () => {
+  const { page, errors } = await open("", { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+  await done(page);
+  const small = await page.evaluate(() => [...document.querySelectorAll("button, select, summary, input:not([type=checkbox]), .file")].filter((one) => one.checkVisibility() && !one.closest(".cm-editor")).map((one) => [one.id || one.textContent.slice(0, 20), one.getBoundingClientRect().height]).filter(([, height]) => height > 0 && height < 31.5));
+  assert.deepEqual(small, []);
+  assert.equal(await page.evaluate(() => document.getElementById("tab-keys").checkVisibility()), false);
+  await page.locator("#tab-pipeline").click();
+  await page.waitForSelector("#pipeline-picture .tp-label");
+  const sticks = await page.evaluate(() => Math.max(...[...document.querySelectorAll(".tp-operation rect")].map((one) => one.getBoundingClientRect().right)) - document.querySelector(".tp-scroll").getBoundingClientRect().right);
+  assert.ok(sticks < 0, `the last cycle sticks out by ${sticks}`);
+  await shot(page, "pipeline-finger");
   assert.deepEqual(errors, []);
 });
 
@@ -706,7 +848,7 @@ test("two machines, and a text before and after a change, stand side by side wit
   }));
   assert.ok(tens[0] > 0 && tens[0] === tens[1], `${tens}`);
   const row = (text) => page.locator(".compare-lines tbody tr", { hasText: text }).locator("td").allTextContents();
-  assert.deepEqual(await row("fmul p, e, KP"), ["27", "fmul    p, e, KP", "1", "8", "5", "−3"]);
+  assert.deepEqual(await row("fmul p, e, KP"), ["28", "fmul    p, e, KP", "1", "8", "5", "−3"]);
   const total = () => page.locator(".compare-lines tfoot td").allTextContents();
   assert.deepEqual((await total()).slice(3), ["65", "38", "−27"], "the lines have the cycles of the period together");
   await shot(page, "compare-machines");
@@ -1191,6 +1333,7 @@ test("an example shows what it does when it is chosen, in the tab where one is",
   await done(page);
   await page.click("#tab-robot");
   assert.match(await page.textContent("#drove"), /other ports than a controller/);
+  for (const id of ["drive", "play", "time"]) assert.ok(await page.isHidden(`#${id}`), `there is nothing to ${id}`);
   await page.click("#tab-step");
   await page.selectOption("#example", "tracking.s");
   assert.equal(await page.evaluate(() => takt.state.tab), "robot");

@@ -77,12 +77,13 @@ impl BoundReport<'_> {
         let open =
             hazards.filter(|hazard| output.open.contains(&hazard.word) && !hazard.problem.is_defined());
         let needed = |hazard: &Hazard| {
-            format!("needs {} at {}", self.missing(hazard), self.program.word_text(hazard.word as usize))
+            let place = self.program.word_text(hazard.word as usize);
+            format!("bounded if {} at {place}", self.missing(hazard))
         };
         open.map(needed).collect()
     }
 
-    /// Condition that a hazard's operation lacks.
+    /// Condition that a hazard's operation lacks, as a clause.
     fn missing(&self, hazard: &Hazard) -> String {
         let names: Vec<String> = self.operands(hazard).into_iter().map(|(name, _)| name).collect();
         let name = |names: Option<&String>| names.cloned().unwrap_or_else(|| "the operand".to_owned());
@@ -90,14 +91,14 @@ impl BoundReport<'_> {
         let code = self.program.code.get(hazard.word as usize);
         let op = code.and_then(|word| Instruction::decode(*word).ok()).map(|instruction| instruction.op);
         match (hazard.problem, op) {
-            (Problem::DivisionByZero, _) => format!("{last} other than 0"),
+            (Problem::DivisionByZero, _) => format!("{last} is never 0"),
             (Problem::Domain, Some(Op::fsqrt)) => format!("{first} >= 0"),
-            (Problem::Domain, Some(Op::facos)) => format!("{first} within [-1, 1]"),
-            (Problem::Domain, _) => format!("{first} where the function has a value"),
-            (Problem::Overflow, _) => format!("a limit of {}", names.join(" or ")),
-            (Problem::Bits, _) => format!("{first} as a number"),
-            (Problem::Unbounded, _) => format!("a limit of {first} in the loop"),
-            _ => format!("a finite {first}"),
+            (Problem::Domain, Some(Op::facos)) => format!("{first} is within [-1, 1]"),
+            (Problem::Domain, _) => format!("the function has a value for {first}"),
+            (Problem::Overflow, _) => format!("{} has a limit", names.join(" or ")),
+            (Problem::Bits, _) => format!("{first} is a number"),
+            (Problem::Unbounded, _) => format!("{first} has a limit in the loop"),
+            _ => format!("{first} is finite"),
         }
     }
 
@@ -258,7 +259,9 @@ impl BoundReport<'_> {
         let states = |UnprovedRange { range, found, .. }: &UnprovedRange, found_text: &str, out: &mut Out| {
             let (low, high) = range.ends();
             let name = range.name(program);
-            writeln!(out, "  {name}: {}, {found_text} {}", ends_text(low, high), interval(*found))
+            let found =
+                found.map_or_else(|| "anywhere".to_owned(), |found| format!("in {}", interval(Some(found))));
+            writeln!(out, "  {name}: {}, {found_text} {found}", ends_text(low, high))
         };
         if enclosure.first().next().is_some() {
             writeln!(
@@ -266,7 +269,7 @@ impl BoundReport<'_> {
                 "\nstates not shown to begin the first period in their range; then nothing above holds"
             )?;
         }
-        enclosure.first().try_for_each(|state| states(state, "begins in", out))?;
+        enclosure.first().try_for_each(|state| states(state, "begins", out))?;
         if !enclosure.converging.is_empty() {
             writeln!(out, "\nkept by all periods together, whose linear part converges")?;
         }
@@ -288,7 +291,7 @@ impl BoundReport<'_> {
         if enclosure.later().next().is_some() {
             writeln!(out, "\nranges that a period is not shown to keep; they are taken as promised")?;
         }
-        enclosure.later().try_for_each(|state| states(state, "may be left in", out))?;
+        enclosure.later().try_for_each(|state| states(state, "may be left", out))?;
         Ok(())
     }
 }
