@@ -20,6 +20,8 @@ const LOW = 120, HIGH = 420;
 const TALL = 0.6, TALL_NARROW = 0.46, NARROW = 480;
 /** A limit is drawn if a value reaches this fraction of it. */
 const NEAR = 0.4;
+/** Below this magnitude, an axis has numbers such as `5e-6`: uPlot's own have three decimal places. */
+const TINY = 0.01;
 /** Tick distances of an integer axis. */
 const WHOLE = [...Array(10).keys()].flatMap((power) => [1, 2, 5].map((step) => step * 10 ** power));
 
@@ -142,13 +144,14 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   };
   // Axes of one width, where the values permit it: the times of all charts stand below one another.
   const size = (_, values) => Math.ceil(Math.max(30, ...(values ?? []).map(widthOf))) + 12;
+  const isTiny = curves.every(({ values }) => values.every((value) => !isNumber(value) || Math.abs(value) < TINY));
   // The first curve on top: an output over the inputs and references that follow it.
   const drawn = curves.map((curve, i) => ({ ...curve, i })).reverse(), ghosts = drawn.filter(({ before }) => before);
   const stepped = uPlot.paths.stepped({ align: 1 });
   const column = (values) => x.map((_, i) => (isNumber(values[i]) ? values[i] : null));
   const plot = new uPlot({
     width: width(), height: height(), padding: [6, 18, 0, 0], scales: { x: { time: false }, y: { range } },
-    axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }) }],
+    axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }), ...(isTiny && { values: (_, splits) => splits.map(short) }) }],
     legend: { show: false }, cursor: { y: false, ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
     series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}${style("--pale")}`, width: 1.6, points: { show: false }, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...drawn.map(({ i, ...curve }) => ({
       label: curve.name, stroke: look[i].colour, width: 1.6, dash: look[i].dash, points: { show: true, filter: () => x.length < 40 || curve.points ? null : alone(curve.values), size: curve.points ? 6 : 4, ...(curve.points && { fill: look[i].colour }) },
