@@ -768,7 +768,7 @@ fn messages_name_the_tables_that_lie_near() {
     let refused = folder.line("run law.s").stderr;
     assert!(refused.ends_with("such as `--inputs law.csv`, which lies beside it\n"), "{refused}");
     let missing = folder.line("run law.s --inputs recorded.csv").stderr;
-    assert!(missing.ends_with("; in this folder there are law.csv\n"), "{missing}");
+    assert!(missing.ends_with("; this folder has law.csv\n"), "{missing}");
     let counted = folder.line("run law.s --inputs law.csv").ok();
     assert!(
         counted.starts_with("1 period on t3: ") && counted.contains(" cycles, 0 deadlines missed\n"),

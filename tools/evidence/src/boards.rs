@@ -42,7 +42,7 @@ const fn design(board: &'static str, machine: &'static str, clock: f64) -> Desig
 }
 
 /// The builds of the table, those of a family after one another.
-const DESIGNS: [Design; 20] = [
+const DESIGNS: [Design; 22] = [
     design("ulx3s-85f", "t1", 75.0),
     design("ulx3s-85f", "t3", 75.0),
     design("ulx3s-45f", "t1", 75.0),
@@ -60,9 +60,11 @@ const DESIGNS: [Design; 20] = [
     design("gatemate-evb", "t1", 20.0),
     design("gatemate-evb", SMALL, 20.0),
     design("olimex-gatemate", "t1", 20.0),
+    design("olimex-gatemate", SMALL, 20.0),
     design("crosslink-nx-evn", "t1", 12.0),
     design("icebreaker", "t1", 12.0),
     design("icebreaker", SMALL, 24.0),
+    design("icesugar", SMALL, 24.0),
 ];
 
 /// The builds to make.

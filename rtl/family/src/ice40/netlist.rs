@@ -4,9 +4,11 @@
 
 use serde_json::{Map, Value, json};
 
-/// Renames the library's PLL, which has no behaviour: the stand-in has its name.
+/// Renames the library's PLL, which has no behaviour: the stand-in has its name. Ports have no values of their own, which Verilator does
+/// not read: no pin is left open.
 pub(super) fn library(text: &str) -> String {
-    text.replace("module SB_PLL40_PAD (", "module SB_PLL40_PAD_without_behaviour (")
+    let text = text.replace("module SB_PLL40_PAD (", "module SB_PLL40_PAD_without_behaviour (");
+    format!("`define NO_ICE40_DEFAULT_ASSIGNMENTS\n{text}")
 }
 
 /// Adapts the cells of a routed netlist to their models, but for the tables, in which faults can be planted.

@@ -49,7 +49,7 @@ fn near(path: &Path) -> String {
             let kind = |folder: &Path| of_kind(folder, path).map(|files| (folder.to_owned(), files));
             match kind(folder).or_else(|| kind(Path::new(EXAMPLES))) {
                 Some((folder, files)) if folder == Path::new(".") => {
-                    format!("; in this folder there are {files}")
+                    format!("; this folder has {files}")
                 }
                 Some((folder, files)) => format!("; {} has {files}", folder.display()),
                 None => String::new(),
