@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Test of the placed and routed board (`rtl/board/tests/top.rs`), and the files that determine its outcome.
+//! Tests of placed and routed boards (`rtl/board/tests/top.rs`), and the files that determine their outcome.
 
 use anyhow::{Context, Result, anyhow};
 use std::fs;
@@ -9,36 +9,70 @@ use takt_automation::command::{cargo, root, run};
 use takt_board::{Board, Wiring, build};
 use takt_isa::T1;
 
-/// Folder of the test's wiring and program.
+/// Folder of the wiring and program of the test with a host.
 const TEST: &str = "rtl/board/tests/top";
-/// Output folder of the circuit.
+/// Folder of the example without a host, for small devices.
+const STEP: &str = "programs/examples/board/step";
+/// Output folder of the circuits.
 const FOLDER: &str = "target/routed";
 
-/// Writes the circuit. Returns the inputs of the test: circuit, tools and their scripts, and the test itself. Host library and emulator
-/// are left out, since the same test runs with the circuit before synthesis.
+/// A board whose netlist is tested: its name, its wiring, the files of its program with their folder, and the folder of its circuit.
+struct RoutedBoard {
+    board: &'static str,
+    folder: &'static str,
+    wiring: &'static str,
+    /// The program first.
+    files: &'static [&'static str],
+}
+
+const BOARDS: [RoutedBoard; 2] = [
+    RoutedBoard { board: "ulx3s-85f", folder: TEST, wiring: "wiring.toml", files: &["loop.s"] },
+    RoutedBoard {
+        board: "icebreaker",
+        folder: STEP,
+        wiring: "icebreaker.toml",
+        files: &["servo.s", "machine.toml"],
+    },
+];
+
+impl RoutedBoard {
+    /// Writes the circuit; returns the packages of its tools.
+    fn write(&self) -> Result<[&'static str; 2]> {
+        let read = |name: &str| {
+            let path = root().join(self.folder).join(name);
+            fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))
+        };
+        let wrong = |mistakes: Vec<takt_board::Mistake>| {
+            anyhow!("{}", mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
+        };
+        let board = Board::from_name(self.board).context("there is this board")?.map_err(wrong)?;
+        let wiring = Wiring::read(self.wiring, &read(self.wiring)?, &board).map_err(wrong)?;
+        let texts = self.files.iter().map(|name| Ok((*name, read(name)?))).collect::<Result<Vec<_>>>()?;
+        let texts: Vec<(&str, &str)> = texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
+        let options = Options { machine: &T1, ..Options::default() };
+        let source = self.files[0];
+        let program = assemble(source, &MemoryLoader::new(&texts), &options)
+            .map_err(|errors| anyhow!("{source}: {}", errors.render(false)))?
+            .program;
+        build::write(&board, &wiring, &program, &root().join(FOLDER).join(self.board))?;
+        Ok(build::packages(&board)?)
+    }
+}
+
+/// Writes the circuits. Returns the inputs of the tests: circuits, tools and their scripts, and the tests themselves. Host library and
+/// emulator are left out, since the same tests run with the circuits before synthesis.
 pub(crate) fn inputs() -> Result<Inputs> {
     let folder = root().join(FOLDER);
     if folder.exists() {
         fs::remove_dir_all(&folder)?;
     }
-    let read = |name: &str| {
-        let path = root().join(TEST).join(name);
-        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))
-    };
-    let wrong = |mistakes: Vec<takt_board::Mistake>| {
-        anyhow!("{}", mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
-    };
-    let (wiring, source) = (read("wiring.toml")?, read("loop.s")?);
-    let board = Board::from_name("ulx3s-85f").context("there is this board")?.map_err(wrong)?;
-    let wiring = Wiring::read("wiring.toml", &wiring, &board).map_err(wrong)?;
-    let options = Options { machine: &T1, ..Options::default() };
-    let loader = MemoryLoader::new(&[("loop.s", source.as_str())]);
-    let program =
-        assemble("loop.s", &loader, &options).map_err(|error| anyhow!("loop.s: {error:?}"))?.program;
-    build::write(&board, &wiring, &program, &folder)?;
-    let tools = Inputs::default().and(build::packages(&board)?).tool("verilator", "--version");
+    let mut tools = Inputs::default().tool("verilator", "--version");
+    for board in &BOARDS {
+        tools = tools.and(board.write()?);
+    }
     let files = [
         TEST,
+        STEP,
         "rtl/board/src/build.rs",
         "rtl/board/src/driver.cpp",
         "rtl/board/src/netlist.rs",
@@ -51,9 +85,9 @@ pub(crate) fn inputs() -> Result<Inputs> {
     files.into_iter().try_fold(tools.generated(FOLDER)?, Inputs::files)
 }
 
-/// Runs the test of the routed board.
+/// Runs the tests of the routed boards.
 pub(crate) fn test() -> Result<()> {
     let mut command = cargo();
-    command.args(["test", "--release", "-p", "takt-board", "--test", "suite", "top::routed"]);
+    command.args(["test", "--release", "-p", "takt-board", "--test", "suite", "top::the_routed"]);
     run(command.env("TAKT_ROUTED", "1"))
 }
