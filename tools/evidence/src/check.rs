@@ -14,8 +14,7 @@ pub(crate) struct Arguments {
     /// The checks by name, which then run even if they have passed with the same files; without names, formal, units, clients, litex and
     /// certificates.
     names: Vec<String>,
-    /// Run all, those that take longer too: the placed and routed board, a bitstream for each family, FMUs in Wine,
-    /// LinuxCNC.
+    /// Run all, those that take longer too: placed and routed boards, a bitstream for each family, FMUs in Wine, LinuxCNC.
     #[arg(long, conflicts_with = "names")]
     all: bool,
 }
