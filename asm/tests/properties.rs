@@ -4,6 +4,7 @@
 use crate::common;
 use crate::rows;
 use proptest::prelude::*;
+use takt_asm::diag::{Diagnostics, Severity};
 use takt_asm::{Expression, disasm, image};
 use takt_isa::program::{Location, LoopBound, Port, Range, Section, Space, Symbol};
 use takt_isa::shape::Field;
@@ -176,8 +177,16 @@ fn round_trip(program: &Program) -> Result<(), TestCaseError> {
             prop_assert_eq!(image(&again.program), image(program));
             Ok(())
         }
+        // Words can write an output after a `publish`; the assembler refuses that.
+        Err(report) if is_published_early(&report) => Ok(()),
         Err(report) => Err(TestCaseError::fail(format!("{}\n{text}", report.render(false)))),
     }
+}
+
+/// The only mistakes are outputs written after a `publish`.
+fn is_published_early(report: &Diagnostics) -> bool {
+    let mut errors = report.list.iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
+    errors.all(|error| error.code == "publish")
 }
 
 /// Any register of the register space.

@@ -97,7 +97,10 @@ fn operands(directive: Directive) -> Option<Rule> {
     Some(match directive {
         Once | Period | Data => blank(),
         Reg | State | Input | Output => blanks(symbol("declaration")),
-        Machine => seq([named(), repeat(seq([optional(text(",")), field("option", name()), assigned()]))]),
+        Machine => seq([
+            choice([named(), field("file", symbol("text"))]),
+            repeat(seq([optional(text(",")), field("option", name()), assigned()])),
+        ]),
         Array => seq([
             blanks(symbol("declaration")),
             optional(seq([

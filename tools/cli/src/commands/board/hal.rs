@@ -118,6 +118,7 @@ pub(super) fn run(arguments: &Hal, color: bool, out: &mut Out) -> Result<()> {
         "--geometry hybrid: the first three joints must be linear"
     );
     let (_, wiring, carried) = arguments.target.read(color, false)?;
+    ensure!(wiring.uart, "LinuxCNC is a host at the UART, which the wiring leaves out (`uart = false`)");
     let application = carried.on_board();
     ensure!(
         !application.is_program(),
