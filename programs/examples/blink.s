@@ -5,9 +5,9 @@
 
 .schedule on
 
-.const  RATE    = 1000                  ; periods per second
-.const  SECONDS = 0.5
-.const  LAST    = RATE*SECONDS - 1      ; periods of one side, counted from 0
+.const  T       = 1e-3                  ; s, from period to period
+.const  SECONDS = 0.5                   ; s, of one side
+.const  LAST    = SECONDS/T - 1         ; periods of one side, counted from 0
 
 .output lamp:int                        ; 1: on
 .state  count:int                       ; periods since the lamp changed

@@ -51,7 +51,12 @@ const PLANT_OF: [(&str, &str); 5] = [
 ];
 /// Ports that are plotted first, where these are not outputs with their references.
 const PLOTTED: [&str; 8] = ["da", "db", "dc", "id", "iq", "id_ref", "iq_ref", "we"];
-const PLOTTED_OF: [(&str, &[&str]); 2] = [("foc.s", &PLOTTED), ("foc_early.s", &PLOTTED)];
+const PLOTTED_OF: [(&str, &[&str]); 4] = [
+    ("biquads.s", &["x", "y"]),
+    ("foc.s", &PLOTTED),
+    ("foc_early.s", &PLOTTED),
+    ("pendulum.s", &["force", "angle", "x", "x_ref"]),
+];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 

@@ -2,7 +2,10 @@
 ; the position, a PI loop of the speed, on a machine for small FPGAs.
 ; What is at which pin: icebreaker.toml, tang-nano-9k.toml; docs/board.md.
 ;
-;   takt board sim --wiring icebreaker.toml --program servo.s --axis motor,encoder,20000
+;   takt board sim --wiring icebreaker.toml --program servo.s \
+;     --axis motor,encoder,20000 --script steps.txt
+;
+; gives it 40 steps, and prints how far the motor has come.
 
 .machine "machine.toml"
 .schedule on

@@ -375,6 +375,7 @@ fn serve(
             out.flush()?;
             next_commands(Some(&arguments.target.program), terminal.path(), wiring.baud);
         }
+        None if arguments.cycles.is_some() || script.is_some() => output::message("the board has no UART"),
         None => output::message("the board has no UART; Ctrl-C ends the simulation"),
     }
     while arguments.cycles.is_none_or(|most| sim.cycles < most) {
