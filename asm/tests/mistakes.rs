@@ -15,11 +15,11 @@ fn every_mistake_is_explained() {
             panic!("{name} is accepted");
         };
         assert!(report.has_errors(), "{name}");
-        let text = report.render(false);
+        let text = report.render_all(false);
         let snapshot = name.trim_end_matches(".s");
         insta::assert_snapshot!(snapshot, text);
         // Colour changes nothing but the colour.
-        assert_eq!(without_escapes(&report.render(true)), text, "{name}");
+        assert_eq!(without_escapes(&report.render_all(true)), text, "{name}");
         // Every error has a place, except for a file that cannot be read at all.
         for message in report.messages() {
             let place =

@@ -285,6 +285,16 @@ impl Diagnostics {
     /// The text for a terminal: message, file, line, column, source line and caret of each diagnostic. Control characters in
     /// sources, file names and messages are escaped. At most [`limits::PRINTED`] of each severity are printed, the others counted.
     pub fn render(&self, colour: bool) -> String {
+        self.render_first(limits::PRINTED, colour)
+    }
+
+    /// The text of [`Diagnostics::render`] with every diagnostic of the list.
+    pub fn render_all(&self, colour: bool) -> String {
+        self.render_first(usize::MAX, colour)
+    }
+
+    /// The text of the first diagnostics of each severity.
+    fn render_first(&self, most: usize, colour: bool) -> String {
         let mut view = View::new(&self.sources);
         let config = term::Config { tab_width: 8, ..term::Config::default() };
         let mut out = Vec::new();
@@ -292,7 +302,7 @@ impl Diagnostics {
         for diagnostic in &self.list {
             let count = if diagnostic.severity == Severity::Error { &mut errors } else { &mut warnings };
             *count += 1;
-            if *count > limits::PRINTED {
+            if *count > most {
                 continue;
             }
             let shown = view.focus(diagnostic);
@@ -307,7 +317,7 @@ impl Diagnostics {
             };
         }
         let mut text = String::from_utf8_lossy(&out).into_owned();
-        let beyond = |count: usize| count.saturating_sub(limits::PRINTED);
+        let beyond = |count: usize| count.saturating_sub(most);
         let more = [
             (self.more_errors + beyond(errors), "error"),
             (self.more_warnings + beyond(warnings), "warning"),

@@ -25,4 +25,14 @@ period:
         fadd a, x, x || b = x
         y = sqrt x
         y = P[1
+        y = P[]
+        y + 1 = x
+        a, = x
+        y = x y
+        y := x
+        KP = 3                          ; a constant without its directive
+        y = 2 x
+        y = x # 2
+        .rep i, 1, 2 = 3
+        .endr
         wait    period
