@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Limits of the diagnostics that are kept, shown and compared.
 
-/// Errors, and warnings, that are kept and shown; the rest are counted.
+/// Errors, and warnings, that are kept; the rest are counted.
 pub const SHOWN: usize = 100;
 /// Errors, and warnings, that are printed: a file that is no source has one in each line, and the first say so.
 pub const PRINTED: usize = 20;

@@ -43,7 +43,7 @@ pub(crate) fn settable(assembled: &AssembledProgram) -> Vec<Value> {
         }
         let from = offsets.units_at(start);
         let to = offsets.units_at(end);
-        // How the source computes a value, such as `0.95/sqrt(3)`: the number alone does not say it.
+        // The computation of a value, such as `0.95/sqrt(3)`, says more than its number.
         let written = source.text.get(start..end).map(str::trim);
         let formula = written.filter(|text| text.parse::<f64>().is_err());
         Some(json!({

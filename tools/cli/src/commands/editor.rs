@@ -142,7 +142,7 @@ pub(crate) fn run(arguments: &Editor, out: &mut Out) -> Result<()> {
     Ok(writeln!(out, "written. {then}")?)
 }
 
-/// Asks on a terminal; elsewhere nobody agrees.
+/// Question on a terminal; without a terminal, the answer is no.
 fn is_agreed(out: &mut Out) -> Result<bool> {
     if !stdin().is_terminal() || !stdout().is_terminal() {
         return Ok(false);
