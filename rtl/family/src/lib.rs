@@ -15,6 +15,7 @@ mod flow;
 pub mod gatemate;
 pub mod gowin;
 pub mod ice40;
+mod netlist;
 pub mod nexus;
 mod pins;
 mod place;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Adapts nextpnr's netlist to the models of its cells: open pins are tied, tables become expressions.
 
+use crate::netlist::{cell, highest_net};
 use serde_json::{Map, Value, json};
 
 /// Corrects a file of yosys' library that assigns a cell's carry to a new wire, which nothing reads, instead of to its output.
@@ -83,42 +84,28 @@ fn mend_cell(cell: &mut Value) {
 /// Replaces tables, carries and multiplexers of a design by yosys' own cells, which yosys writes as expressions. (As instances of the
 /// library's model, each table would be a separate module: Verilator takes minutes for thousands of these.)
 pub(super) fn tables(cells: Map<String, Value>) -> Map<String, Value> {
-    let nets = cells.values().flat_map(|cell| cell["connections"].as_object().into_iter().flatten());
-    let bits = nets.flat_map(|(_, net)| net.as_array().into_iter().flatten()).filter_map(Value::as_u64);
-    let mut free = bits.max().unwrap_or(1);
+    let mut free = highest_net(&cells);
     let mut found = Map::new();
-    for (name, mut cell) in cells {
-        if cell["type"] != "TRELLIS_COMB" || cell["parameters"]["MODE"] == "DPRAM" {
-            found.insert(name, cell);
+    for (name, mut of) in cells {
+        if of["type"] != "TRELLIS_COMB" || of["parameters"]["MODE"] == "DPRAM" {
+            found.insert(name, of);
             continue;
         }
-        let is_carry = take(&mut cell, "MODE").is_some_and(|mode| mode == "CCU2");
-        let injects = take(&mut cell, "CCU2_INJECT1").is_some_and(|injects| injects == "YES");
+        let is_carry = take(&mut of, "MODE").is_some_and(|mode| mode == "CCU2");
+        let injects = take(&mut of, "CCU2_INJECT1").is_some_and(|injects| injects == "YES");
         // A multiplexer of multiplexers, for a table of six inputs or more; otherwise a multiplexer of two tables.
-        let is_wide = ["FXA", "FXB"].iter().any(|pin| !cell["connections"][pin].is_null());
-        let table = format!("{:0>16}", take(&mut cell, "INITVAL").unwrap_or_default());
-        let pin = |name: &str| match &cell["connections"][name] {
+        let is_wide = ["FXA", "FXB"].iter().any(|pin| !of["connections"][pin].is_null());
+        let table = format!("{:0>16}", take(&mut of, "INITVAL").unwrap_or_default());
+        let pin = |name: &str| match &of["connections"][name] {
             Value::Null => json!("0"),
             net => net[0].clone(),
         };
         let mut put = |what: &str, kind: &str, parameters: Value, inputs: Value, output: &Value| {
-            let mut connections = inputs;
-            let directions: Map<String, Value> = connections
-                .as_object()
-                .into_iter()
-                .flatten()
-                .map(|(pin, _)| (pin.clone(), json!("input")))
-                .chain([("Y".to_owned(), json!("output"))])
-                .collect();
-            connections["Y"] = json!([output]);
-            let cell = json!({
-                "hide_name": 1, "type": kind, "parameters": parameters, "attributes": {},
-                "port_directions": directions, "connections": connections,
-            });
-            found.insert(format!("{name}{what}"), cell);
+            let of = cell(kind, parameters, inputs, json!({ "Y": [output] }));
+            found.insert(format!("{name}{what}"), of);
         };
         // The design's net at a pin, or a new net.
-        let mut net = |name: Option<&str>| match name.map(|name| &cell["connections"][name]) {
+        let mut net = |name: Option<&str>| match name.map(|name| &of["connections"][name]) {
             Some(Value::Array(net)) => net[0].clone(),
             _ => {
                 free += 1;
@@ -136,7 +123,7 @@ pub(super) fn tables(cells: Map<String, Value>) -> Map<String, Value> {
             f = net(Some("F"));
             put("$sum", "$_XOR_", json!({}), json!({ "A": [value], "B": [pin("FCI")] }), &f);
         }
-        if is_carry && cell["connections"].get("FCO").is_some() {
+        if is_carry && of["connections"].get("FCO").is_some() {
             let mut generated = json!("0");
             if sum {
                 generated = net(None);
@@ -145,7 +132,7 @@ pub(super) fn tables(cells: Map<String, Value>) -> Map<String, Value> {
             let carry = json!({ "A": [generated], "B": [pin("FCI")], "S": [value] });
             put("$carry", "$_MUX_", json!({}), carry, &pin("FCO"));
         }
-        if cell["connections"].get("OFX").is_some() {
+        if of["connections"].get("OFX").is_some() {
             let (a, b) = if is_wide { (pin("FXA"), pin("FXB")) } else { (f, pin("F1")) };
             put("$wide", "$_MUX_", json!({}), json!({ "A": [a], "B": [b], "S": [pin("M")] }), &pin("OFX"));
         }
@@ -165,18 +152,15 @@ fn tie(cell: &mut Value, pin: &str, net: Value) {
 }
 
 /// Replaces a pin of the device by a buffer: the tristate model would drive a port of the top from both sides.
-fn buffer(cell: &mut Value) {
-    let (from, to) = match take(cell, "DIR").as_deref() {
+fn buffer(of: &mut Value) {
+    let (from, to) = match take(of, "DIR").as_deref() {
         Some("INPUT") => ("B", "O"),
         Some("OUTPUT") => ("I", "B"),
         // Boards have no bidirectional pins.
         _ => return,
     };
-    *cell = json!({
-        "hide_name": 1, "type": "$_BUF_", "parameters": {}, "attributes": {},
-        "port_directions": { "A": "input", "Y": "output" },
-        "connections": { "A": cell["connections"][from], "Y": cell["connections"][to] },
-    });
+    let [from, to] = [from, to].map(|pin| of["connections"][pin].clone());
+    *of = cell("$_BUF_", json!({}), json!({ "A": from }), json!({ "Y": to }));
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //! Adapts nextpnr's netlist to the models of its cells, which are those of yosys' library: packed cells become tables, flip-flops, block
 //! RAMs and multipliers again.
 
+use crate::netlist::{cell, highest_net};
 use serde_json::{Map, Value, json};
 
 /// Renames the library's PLL, which has no behaviour: the stand-in has its name. Ports have no values of their own, which Verilator does
@@ -46,21 +47,6 @@ fn net_or(cell: &Value, pin: &str, level: &str) -> Value {
 /// Nets at the pins `NAME_0` to `NAME_{bits - 1}`, open ones at a level.
 fn vector(cell: &Value, name: &str, bits: usize, level: &str) -> Value {
     (0..bits).map(|bit| net_or(cell, &format!("{name}_{bit}"), level)).collect()
-}
-
-/// A cell of yosys' library, given inputs and outputs.
-fn cell(kind: &str, parameters: Value, inputs: Value, outputs: Value) -> Value {
-    let directions = |pins: &Value, direction: &str| {
-        let pins: Vec<_> = pins.as_object().into_iter().flatten().collect();
-        pins.into_iter().map(|(pin, _)| (pin.clone(), json!(direction))).collect::<Vec<_>>()
-    };
-    let both = [directions(&inputs, "input"), directions(&outputs, "output")].concat();
-    let connections: Map<String, Value> =
-        [inputs, outputs].into_iter().filter_map(|pins| pins.as_object().cloned()).flatten().collect();
-    json!({
-        "hide_name": 1, "type": kind, "parameters": parameters, "attributes": {},
-        "port_directions": both.into_iter().collect::<Map<_, _>>(), "connections": connections,
-    })
 }
 
 fn buffer(of: &Value, from: &str, to: &str) -> Value {
@@ -158,9 +144,7 @@ fn multiplier(of: &mut Value) {
 
 /// Replaces the logic cells of a design by yosys' own tables and gates, and the library's flip-flops.
 pub(super) fn tables(cells: Map<String, Value>) -> Map<String, Value> {
-    let nets = cells.values().flat_map(|cell| cell["connections"].as_object().into_iter().flatten());
-    let bits = nets.flat_map(|(_, net)| net.as_array().into_iter().flatten()).filter_map(Value::as_u64);
-    let mut free = bits.max().unwrap_or(1);
+    let mut free = highest_net(&cells);
     let mut found = Map::new();
     for (name, mut of) in cells {
         open_outputs(&mut of, &mut free);
