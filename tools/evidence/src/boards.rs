@@ -21,12 +21,15 @@ use takt_isa::spec::machines::MACHINES;
 const RECORD: &str = "rtl/boards.json";
 /// Document with the table of the builds.
 pub(crate) const DOCUMENT: &str = "docs/board.md";
-/// Program of the builds with Takt's own machines.
-const PROGRAM: &str = "programs/examples/board/position.s";
+/// Folder of the program of the builds with Takt's own machines, [`PROGRAM`].
+const FOLDER: &str = "programs/examples/board";
+const PROGRAM: &str = "position.s";
 /// Folder of the program for small devices, [`SMALL_PROGRAM`], with its machine, [`SMALL_MACHINE`]; its board has no UART.
-const SMALL_FOLDER: &str = "programs/examples/board/step";
+pub(crate) const SMALL_FOLDER: &str = "programs/examples/board/step";
 const SMALL_PROGRAM: &str = "servo.s";
 const SMALL_MACHINE: &str = "machine.toml";
+/// Files of the program, itself first.
+pub(crate) const SMALL_FILES: &[&str] = &[SMALL_PROGRAM, SMALL_MACHINE];
 /// Name of that machine.
 const SMALL: &str = "small";
 
@@ -156,11 +159,13 @@ pub(crate) fn one_of_each() -> Result<()> {
     Ok(())
 }
 
-fn wrong(mistakes: Vec<takt_board::Mistake>) -> anyhow::Error {
+/// Error of mistakes in a board's or a wiring's file.
+pub(crate) fn wrong(mistakes: Vec<takt_board::Mistake>) -> anyhow::Error {
     anyhow!("{}", mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
 }
 
-fn board(name: &str) -> Result<Board> {
+/// Finds a board by name.
+pub(crate) fn board(name: &str) -> Result<Board> {
     Board::from_name(name).with_context(|| format!("there is no board `{name}`"))?.map_err(wrong)
 }
 
@@ -191,23 +196,27 @@ fn wiring(board: &Board, design: &Design) -> Result<Wiring> {
 
 /// Program of the builds with a machine.
 fn program(machine: &str) -> Result<Program> {
-    let read =
-        |file: &str| fs::read_to_string(root().join(file)).with_context(|| format!("cannot read {file}"));
     if machine == SMALL {
-        let [source, row] =
-            [SMALL_PROGRAM, SMALL_MACHINE].map(|name| read(&format!("{SMALL_FOLDER}/{name}")));
-        let (source, row) = (source?, row?);
-        let files = [(SMALL_PROGRAM, source.as_str()), (SMALL_MACHINE, row.as_str())];
-        return assembled(SMALL_PROGRAM, &files, &Options::default());
+        return assembled(SMALL_FOLDER, SMALL_FILES, &Options::default());
     }
     let known = MACHINES.iter().copied().find(|known| known.name == machine);
     let machine = known.with_context(|| format!("there is no machine `{machine}`"))?;
-    assembled("position.s", &[("position.s", &read(PROGRAM)?)], &Options { machine, ..Options::default() })
+    assembled(FOLDER, &[PROGRAM], &Options { machine, ..Options::default() })
 }
 
-fn assembled(name: &str, files: &[(&str, &str)], options: &Options) -> Result<Program> {
-    let result = assemble(name, &MemoryLoader::new(files), options);
-    Ok(result.map_err(|errors| anyhow!("{}", errors.render(false)))?.program)
+/// Reads a file of a folder of the project.
+pub(crate) fn read(folder: &str, name: &str) -> Result<String> {
+    let path = root().join(folder).join(name);
+    fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+/// Assembles the first of the files in a folder.
+pub(crate) fn assembled(folder: &str, files: &[&str], options: &Options) -> Result<Program> {
+    let texts = files.iter().map(|name| read(folder, name)).collect::<Result<Vec<_>>>()?;
+    let files: Vec<(&str, &str)> = files.iter().copied().zip(texts.iter().map(String::as_str)).collect();
+    let (source, _) = files[0];
+    let result = assemble(source, &MemoryLoader::new(&files), options);
+    Ok(result.map_err(|errors| anyhow!("{source}: {}", errors.render(false)))?.program)
 }
 
 /// Builds a design in `target/boards`.
@@ -295,7 +304,7 @@ fn line(row: &Build) -> Result<String> {
 pub(crate) fn table() -> Result<String> {
     let rows = recorded()?;
     let mut text = format!(
-        "`{PROGRAM}` with an encoder and a PWM at the first pins of each board, built by `cargo evidence boards`; the machine `{SMALL}` with
+        "`{FOLDER}/{PROGRAM}` with an encoder and a PWM at the first pins of each board, built by `cargo evidence boards`; the machine `{SMALL}` with
 `{SMALL_FOLDER}/{SMALL_PROGRAM}`, which has step and direction in place of a host. LUTs, flip-flops, multipliers
 and block RAMs are the device's own, as yosys or nextpnr count them; the clock is in MHz.
 

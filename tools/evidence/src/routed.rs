@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tests of placed and routed boards (`rtl/board/tests/top.rs`), and the files that determine their outcome.
 
-use anyhow::{Context, Result, anyhow};
+use crate::boards;
+use anyhow::Result;
 use std::fs;
-use takt_asm::{MemoryLoader, Options, assemble};
+use takt_asm::Options;
 use takt_automation::check_cache::Inputs;
 use takt_automation::command::{cargo, root, run};
-use takt_board::{Board, Wiring, build};
+use takt_board::{Wiring, build};
 use takt_isa::T1;
 
 /// Folder of the wiring and program of the test with a host.
 const TEST: &str = "rtl/board/tests/top";
-/// Folder of the example without a host, for small devices.
-const STEP: &str = "programs/examples/board/step";
 /// Output folder of the circuits.
 const FOLDER: &str = "target/routed";
 
@@ -29,31 +28,20 @@ const BOARDS: [RoutedBoard; 2] = [
     RoutedBoard { board: "ulx3s-85f", folder: TEST, wiring: "wiring.toml", files: &["loop.s"] },
     RoutedBoard {
         board: "icebreaker",
-        folder: STEP,
+        folder: boards::SMALL_FOLDER,
         wiring: "icebreaker.toml",
-        files: &["servo.s", "machine.toml"],
+        files: boards::SMALL_FILES,
     },
 ];
 
 impl RoutedBoard {
     /// Writes the circuit; returns the packages of its tools.
     fn write(&self) -> Result<[&'static str; 2]> {
-        let read = |name: &str| {
-            let path = root().join(self.folder).join(name);
-            fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))
-        };
-        let wrong = |mistakes: Vec<takt_board::Mistake>| {
-            anyhow!("{}", mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))
-        };
-        let board = Board::from_name(self.board).context("there is this board")?.map_err(wrong)?;
-        let wiring = Wiring::read(self.wiring, &read(self.wiring)?, &board).map_err(wrong)?;
-        let texts = self.files.iter().map(|name| Ok((*name, read(name)?))).collect::<Result<Vec<_>>>()?;
-        let texts: Vec<(&str, &str)> = texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
+        let board = boards::board(self.board)?;
+        let wiring = Wiring::read(self.wiring, &boards::read(self.folder, self.wiring)?, &board);
+        let wiring = wiring.map_err(boards::wrong)?;
         let options = Options { machine: &T1, ..Options::default() };
-        let source = self.files[0];
-        let program = assemble(source, &MemoryLoader::new(&texts), &options)
-            .map_err(|errors| anyhow!("{source}: {}", errors.render(false)))?
-            .program;
+        let program = boards::assembled(self.folder, self.files, &options)?;
         build::write(&board, &wiring, &program, &root().join(FOLDER).join(self.board))?;
         Ok(build::packages(&board)?)
     }
@@ -72,7 +60,7 @@ pub(crate) fn inputs() -> Result<Inputs> {
     }
     let files = [
         TEST,
-        STEP,
+        boards::SMALL_FOLDER,
         "rtl/board/src/build.rs",
         "rtl/board/src/driver.cpp",
         "rtl/board/src/netlist.rs",
