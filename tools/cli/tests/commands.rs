@@ -800,8 +800,9 @@ fn an_editor_is_set_up_once() {
     ] {
         let written = line(&format!("editor {editor} --write"));
         assert!(written.contains("\nwritten. ") && folder.read_text(file).contains("takt"), "{written}");
+        assert!(written.contains("\nNext: `"), "{written}");
         let again = line(&format!("editor {editor} --write"));
-        assert!(again.contains(" as it is\n") && again.ends_with("nothing to do\n"), "{again}");
+        assert!(again.contains(" as it is\n") && again.contains("nothing to do. "), "{again}");
     }
     let helix = folder.read_text(".config/helix/languages.toml");
     assert!(helix.starts_with("# mine\n") && !helix.contains("/path/to"), "{helix}");
