@@ -137,7 +137,7 @@ async function open(options = {}) {
 const shown = (page, selector, wanted) => page.waitForFunction(([selector, source]) => new RegExp(source).test(document.querySelector(selector)?.textContent ?? ""), [selector, wanted.source]);
 const row = (page, name) => page.locator(`[data-name="${name}"]`);
 /** Waits for the value in a field, which the board has. */
-const field = (page, name, value) => page.waitForFunction(([name, value]) => document.querySelector(`[data-name="${name}"] .field`).value === value, [name, value]);
+const field = (page, name, value) => page.waitForFunction(([name, value]) => document.querySelector(`[data-name="${name}"] .field`)?.value === value, [name, value]);
 
 async function shot(page, name) {
   const into = process.env.TAKT_SCREENSHOTS;
