@@ -110,6 +110,10 @@ pub struct Oscillator {
     pub cell: &'static str,
     /// Lowest and highest nominal frequency, MHz.
     pub mhz: (f64, f64),
+    /// Nominal frequency of [`Oscillator::instance`], MHz.
+    pub runs: f64,
+    /// Instance in Verilog that drives `oscillation` at some 10 MHz, or at the cell's only frequency.
+    pub instance: &'static str,
 }
 
 impl PartialEq for Family {

@@ -40,7 +40,12 @@ pub static FAMILY: Family = Family {
     multiplier: [27, 27],
     carry: None,
     initial_registers: true,
-    oscillator: Some(Oscillator { cell: "cyclonev_oscillator", mhz: (100.0, 100.0) }),
+    oscillator: Some(Oscillator {
+        cell: "cyclonev_oscillator",
+        mhz: (100.0, 100.0),
+        runs: 100.0,
+        instance: "cyclonev_oscillator oscillator (.oscena(1'b1), .clkout(oscillation));",
+    }),
     cells: Cells {
         luts: &[("MISTRAL_ALUT", 1), ("MISTRAL_NOT", 1), ("MISTRAL_MLAB", 2)],
         carries: &[],

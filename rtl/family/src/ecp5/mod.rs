@@ -33,7 +33,12 @@ pub static FAMILY: Family = Family {
     multiplier: [18, 18],
     carry: Some(Carry { cell: "CCU2C", luts: 2, ports: &["FCI", "FCO"] }),
     initial_registers: true,
-    oscillator: Some(Oscillator { cell: "OSCG", mhz: (2.4, 155.0) }),
+    oscillator: Some(Oscillator {
+        cell: "OSCG",
+        mhz: (2.4, 155.0),
+        runs: 310.0 / 32.0,
+        instance: "OSCG #(.DIV(32)) oscillator (.OSC(oscillation));",
+    }),
     cells: Cells {
         // The 16 x 4 bits of a memory in logic take four LUT4.
         luts: &[("LUT4", 1), ("CCU2C", 2), ("TRELLIS_DPR16X4", 4)],

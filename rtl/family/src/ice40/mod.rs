@@ -36,7 +36,12 @@ pub static FAMILY: Family = Family {
     multiplier: [16, 16],
     carry: None,
     initial_registers: true,
-    oscillator: Some(Oscillator { cell: "SB_HFOSC", mhz: (6.0, 48.0) }),
+    oscillator: Some(Oscillator {
+        cell: "SB_HFOSC",
+        mhz: (6.0, 48.0),
+        runs: 12.0,
+        instance: "SB_HFOSC #(.CLKHF_DIV(\"0b10\")) oscillator (.CLKHFPU(1'b1), .CLKHFEN(1'b1), .CLKHF(oscillation));",
+    }),
     cells: Cells {
         luts: &[("SB_LUT4", 1)],
         carries: &[],

@@ -20,7 +20,12 @@ pub static FAMILY: Family = Family {
     multiplier: [18, 18],
     carry: None,
     initial_registers: true,
-    oscillator: Some(Oscillator { cell: "OSCA", mhz: (1.8, 450.0) }),
+    oscillator: Some(Oscillator {
+        cell: "OSCA",
+        mhz: (1.8, 450.0),
+        runs: 10.0,
+        instance: "OSCA #(.HF_CLK_DIV(\"44\"), .HF_OSC_EN(\"ENABLED\")) oscillator (.HFOUTEN(1'b1), .HFSDSCEN(1'b0), .HFCLKOUT(oscillation));",
+    }),
     cells: Cells {
         luts: &[("LUT4", 1), ("DPR16X4", 4)],
         carries: &[],
