@@ -79,6 +79,7 @@ module bench;
             #1000;
         end
     endtask
+    initial #1 $display(\"stands %b%b%b%b%b\", drive, high, low, brake, lamp);
     initial begin
         wait (lamp === 1'b1 && high === 1'b1) stopped(1'b0);
         wait (lamp === 1'b1 && low === 1'b1) stopped(1'b1);
@@ -131,14 +132,15 @@ fn the_watchdogs_pin_changes_once_a_period_while_outputs_drive() {
 }
 
 #[test]
-fn pins_go_off_when_the_clock_stops() {
+fn pins_are_off_before_the_first_clock_edge_and_when_the_clock_stops() {
     let (on, off) = (["11001", "10101"], "00010");
     let watched = stopped("clock_watch = true\n");
+    let first = [format!("stands {off}")];
     let expected = on.map(|on| [format!("runs {on}"), format!("stands {off}"), format!("stands {off}")]);
-    assert_eq!(watched, expected.as_flattened());
+    assert_eq!(watched, [&first, expected.as_flattened()].concat());
     // Without the watch, each pin stays as it is.
     let expected = on.map(|on| [format!("runs {on}"), format!("stands {on}"), format!("stands {on}")]);
-    assert_eq!(stopped(""), expected.as_flattened());
+    assert_eq!(stopped(""), [&first, expected.as_flattened()].concat());
 }
 
 /// Lines of the testbench for a board with more keys in its wiring.
