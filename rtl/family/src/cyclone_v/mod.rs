@@ -37,6 +37,7 @@ pub static FAMILY: Family = Family {
         logic: Some(Shape { words: 32, bits: 20 }),
     },
     lut: "ALUT",
+    cells_per_flip_flop: None,
     multiplier: [27, 27],
     carry: None,
     initial_registers: true,

@@ -53,4 +53,5 @@ IO_LOC \"serial_out\" G11;
     ),
     options: &[],
     units: &[],
+    parts: [[0.0; 4]; 2],
 };

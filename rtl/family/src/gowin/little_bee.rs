@@ -49,4 +49,5 @@ IO_LOC \"serial_out\" 17;
     ),
     options: &[],
     units: &[],
+    parts: [[0.0; 4]; 2],
 };

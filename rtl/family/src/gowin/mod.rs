@@ -30,6 +30,7 @@ const GW2A: Family = Family {
     modules: &[],
     memories: Memories { block: KBIT_18, logic: Some(Shape { words: 16, bits: 4 }) },
     lut: "LUT4",
+    cells_per_flip_flop: None,
     multiplier: [18, 18],
     carry: Some(Carry { cell: "ALU", luts: 1, ports: &["CIN", "COUT"] }),
     initial_registers: true,
@@ -165,4 +166,5 @@ IO_LOC \"serial_out\" C13;
     ),
     options: &[],
     units: &[],
+    parts: [[0.0; 4]; 2],
 };

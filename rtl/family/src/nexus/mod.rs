@@ -17,6 +17,7 @@ pub static FAMILY: Family = Family {
     modules: &[],
     memories: Memories { block: KBIT_18, logic: Some(Shape { words: 16, bits: 4 }) },
     lut: "LUT4",
+    cells_per_flip_flop: None,
     multiplier: [18, 18],
     carry: None,
     initial_registers: true,
@@ -88,6 +89,7 @@ ldc_set_location -site {F18} [get_ports serial_out]
     ),
     options: &[],
     units: &[],
+    parts: [[0.0; 4]; 2],
 };
 
 /// Physical design constraints (PDC). The clock's frequency is an option of place and route.

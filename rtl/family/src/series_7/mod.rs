@@ -25,6 +25,7 @@ pub static FAMILY: Family = Family {
     modules: &[],
     memories: Memories { block: KBIT_18, logic: Some(Shape { words: 32, bits: 6 }) },
     lut: "LUT6",
+    cells_per_flip_flop: None,
     multiplier: [25, 18],
     carry: None,
     initial_registers: true,
