@@ -9,9 +9,9 @@
 .schedule on
 
 .const  T  = 0.01                       ; s, sampling period
-.const  QA = 4                          ; (m/s²)², of the acceleration that is not known
+.const  QA = 4.0                        ; m²/s⁴, of the acceleration that is not known
 .const  RX = 0.04                       ; m², of the measurement
-.const  P0 = 10                         ; of the first covariance
+.const  P0 = 10.0                       ; of the first covariance
 
 .input  z1, z2                          ; m, measured positions
 .output x1, x2, x3, x4                  ; m, m, m/s, m/s: position, velocity
@@ -34,7 +34,7 @@
         mov     x{i}, zero
         .rep    j, i, 4
         .if     i == j
-        mov     P{i}{j}, float(P0)
+        mov     P{i}{j}, P0
         .else
         mov     P{i}{j}, zero
         .endif

@@ -11,6 +11,7 @@
 
 .schedule on
 
+.const  T = 0.01                        ; s, sampling period
 .const  N = 12                          ; states
 .const  M = 3                           ; measurements
 .const  P = 4                           ; outputs

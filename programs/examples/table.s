@@ -5,6 +5,7 @@
 .include <math.s>
 .schedule on
 
+.const  T    = 0.1                      ; s, from one reading to the next
 .const  UREF = 3.3                      ; V, of the divider above the thermistor
 .const  RPULL = 10e3                    ; Ω
 .const  R25  = 10e3                     ; Ω, at 25 °C

@@ -107,8 +107,11 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
             unused(context, register, used);
         }
     }
+    // The sampling period may be there for plants and plots alone.
+    let is_period = |name: &str| crate::units::PERIODS.iter().any(|(period, _)| *period == name);
     for constant in &context.declared.constants {
-        if !constant.used && constant.watched && !constant.name.starts_with('_') {
+        let is_spared = constant.name.starts_with('_') || is_period(&constant.name);
+        if !constant.used && constant.watched && !is_spared {
             context.reports.sink.add(Severity::Warning, "unused", constant.span, || {
                 Diagnostic::warning(
                     "unused",

@@ -2,7 +2,7 @@
 //! A plant between the output and the input ports of a program.
 
 use super::file::{self, CODE, Course, Entry, PlantFile, PortOf, UNLIMITED, entry_of, listed};
-use super::{Interface, Plant, indexed_parts, is_of};
+use super::{Interface, Model, Plant, indexed_parts, is_of};
 use std::sync::Arc;
 use takt_diagnostics::diag::{Diagnostic, Diagnostics};
 use takt_diagnostics::nearest;
@@ -362,6 +362,14 @@ impl<P: Plant> ClosedLoop<P> {
     /// Names of the states as columns of a table: `dc_motor.w`.
     pub fn state_names(&self) -> impl Iterator<Item = String> {
         self.interface.states.iter().map(|state| format!("{}.{state}", self.interface.name))
+    }
+
+    /// Units of the states, in the order of [`Interface::states`]; `None` for an FMU's.
+    pub fn state_units(&self) -> Vec<Option<String>> {
+        let model = Model::named(&self.interface.name);
+        let unit =
+            |state: &String| Some(model?.states.iter().find(|one| is_of(state, one.name))?.unit.to_owned());
+        self.interface.states.iter().map(unit).collect()
     }
 
     /// The plant.

@@ -19,7 +19,9 @@ fn a_system_fits_its_board_and_a_circuit_is_written() {
     let text = folder.line(&format!("board check {}", axis())).ok();
     assert_eq!(
         text,
-        "ulx3s-85f, profile t1, servo t1, watch t1: 3 peripherals, 3 of the system's ports on pins, a period of 5000 cycles at 50 MHz\n"
+        "ulx3s-85f, profile t1, servo t1, watch t1: 3 peripherals, 3 of the system's ports on pins, a period of 5000 cycles at 50 MHz\n\
+         the cores take about 17700 of 83640 LUT4, 63 of 208 block RAMs, 18 of 156 multipliers of the LFE5U-85F (estimated); \
+         `takt board build` counts all cells\n"
     );
     folder.line(&format!("board build {} --sources -o out", axis())).ok();
     assert!(folder.read_text("out/takt_system_board.v").contains("module takt_system_board"));

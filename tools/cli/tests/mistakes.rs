@@ -18,7 +18,7 @@ period: fadd F, a, a
 /// A folder with valid and invalid sources and tables.
 fn workshop() -> Folder {
     let folder = Folder::new();
-    let files: [(&str, &[u8]); 36] = [
+    let files: [(&str, &[u8]); 40] = [
         ("pd.s", PD.as_bytes()),
         ("empty.s", b""),
         ("comment.s", b"; nothing yet\n"),
@@ -58,17 +58,21 @@ fn workshop() -> Folder {
         ("far.ngc", b"G0 X0 Y0 Z700\nG1 X9000 F2000\n"),
         ("word.ngc", b"G0 X0 Y0 Z700\nthe quick brown fox\n"),
         ("still.ngc", b"G0 X0 Y0 Z700\n"),
+        ("notes.md", b"# Notes\n\nNo source.\n"),
+        ("steps.csv", b"w_ref,w\n1,0\n"),
+        ("damaged.takt", b"\x7fELG\x01\x01"),
+        ("archive", b"PK\x03\x04"),
     ];
     for (name, contents) in files {
         folder.write(name, contents);
     }
     std::fs::create_dir(folder.path().join("folder")).unwrap();
-    folder.line("asm pd.s -o pd.takt").ok_with("pd.takt: 4 bundles");
+    folder.line("asm pd.s -o pd.takt").ok_with("wrote pd.takt: 4 bundles");
     let image = folder.read("pd.takt");
     folder.write("cut.takt", &image[..image.len() / 2]);
     folder.write("stub.takt", &image[..10]);
-    folder.line("asm unwritten.s -m f3 -o unwritten.takt").ok_with("unwritten.takt: ");
-    folder.line("asm unwritten.s -m f3 --strip -o stripped.takt").ok_with("stripped.takt: ");
+    folder.line("asm unwritten.s -m f3 -o unwritten.takt").ok_with("wrote unwritten.takt: ");
+    folder.line("asm unwritten.s -m f3 --strip -o stripped.takt").ok_with("wrote stripped.takt: ");
     folder
 }
 
@@ -133,6 +137,10 @@ fn rejects_files_that_are_not_programs() {
             "disasm cut.takt",
             "run pd.takt --machine t1",
             "run pd.s/pd.s",
+            "asm notes.md",
+            "run steps.csv",
+            "run damaged.takt",
+            "debug archive",
             "track --program trackin",
             "track --program folder",
             "track --program pd.s",

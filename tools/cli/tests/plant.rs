@@ -266,3 +266,36 @@ fn loops_have_the_bits_of_the_playground() {
         assert!(std::fs::read_to_string(&path).unwrap() == table, "{path} is stale: TAKT_BLESS=1 writes it");
     }
 }
+
+/// The message about a program without inputs names the plant beside it that fits, and the table.
+#[test]
+fn a_program_without_inputs_is_told_its_plant() {
+    let folder = Folder::new();
+    let file = |name: &str| format!("{}/../{name}", example().display());
+    let [run, other] = ["pi.s", "biquads.s"].map(|name| folder.line(&format!("run {}", file(name))).stderr);
+    let plant = format!(
+        "such as `--plant {} --periods 400` or `--inputs {}`",
+        file("plant/dc_motor.toml"),
+        file("pi.csv")
+    );
+    assert!(run.contains(&plant), "{run}");
+    assert!(other.contains(&format!("such as `--inputs {}`", file("biquads.csv"))), "{other}");
+    // The command that it names works.
+    let done = folder
+        .line(&format!("run {} --plant {} --periods 400", file("pi.s"), file("plant/dc_motor.toml")))
+        .ok();
+    assert!(done.starts_with("400 periods on t3"), "{done}");
+}
+
+/// The picture of a loop names its file, has units, and shows a sensor's state once.
+#[test]
+fn the_picture_of_a_loop_has_units() {
+    let folder = Folder::new();
+    let [program, plant] = ["../pi.s", "dc_motor.toml"].map(|name| format!("{}/{name}", example().display()));
+    let done = folder.line(&format!("run {program} --plant {plant} --periods 400 --plot loop.svg"));
+    assert!(done.stderr.contains("the curves are in loop.svg"), "{done:?}");
+    let svg = folder.read_text("loop.svg");
+    let has = |text: &str| svg.contains(&format!("\n{text}\n"));
+    assert!(["rad/s", "V", "A", "rad", "time, s", "w_ref", "w", "dc_motor.i"].into_iter().all(has), "{svg}");
+    assert!(!has("dc_motor.w"), "{svg}");
+}

@@ -50,6 +50,9 @@ impl Files {
                 image::read_with(bytes).with_context(|| format!("{name} is not an image that can run"))?;
             return Ok((program, debug.unwrap_or_default()));
         }
+        if let Some(why) = takt_asm::foreign(name, bytes) {
+            bail!("{why}");
+        }
         let mut files = MemoryLoader::default();
         for (name, bytes) in &self.0 {
             files.add(name, bytes.clone());

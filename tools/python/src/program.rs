@@ -251,6 +251,7 @@ pub(crate) fn read_program(
         let program = Program::from_image(&text, path)?.program;
         return of_machine(path, Arc::unwrap_or_clone(program), machine);
     }
+    may_be_source(path, &text)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
     let words = (text, name, folder, Vec::new(), wishes);
@@ -289,7 +290,16 @@ pub(crate) fn load(path: PathBuf) -> PyResult<(Option<Program>, Py<PyBytes>)> {
     }
     let bytes = std::fs::read(&path).map_err(|error| named(&path, error))?;
     let program = image::is_image(&bytes).then(|| Program::from_image(&bytes, &path)).transpose()?;
+    if program.is_none() {
+        may_be_source(&path, &bytes)?;
+    }
     Ok((program, Python::attach(|py| PyBytes::new(py, &bytes).unbind())))
+}
+
+/// Rejects a file that is neither a source nor an image.
+fn may_be_source(path: &Path, bytes: &[u8]) -> PyResult<()> {
+    takt_asm::foreign(&path.display().to_string(), bytes)
+        .map_or(Ok(()), |why| Err(PyValueError::new_err(why)))
 }
 
 pub(crate) fn named(path: &Path, error: std::io::Error) -> PyErr {

@@ -5,57 +5,81 @@ use crate::{CYCLES, PERIODS, SOURCE_BYTES};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::OnceLock;
-use takt_isa::MACHINES;
+use takt_isa::{MACHINES, Machine};
 use takt_programs::{EXAMPLES, SOURCES, title};
 
-/// Examples from `programs/examples` that come first in the list, in this order; all others follow.
-const FIRST: [&str; 5] = ["pi.s", "gains.s", "pendulum.s", "foc.s", "blink.s"];
-/// Titles in the menu of examples, where a sentence would not fit.
-const SHORT: [(&str, &str); 12] = [
-    ("biquads.s", "low-pass filter"),
-    ("blink.s", "blinking lamp"),
-    ("foc.s", "motor current"),
-    ("foc_early.s", "motor current, early"),
-    ("gains.s", "motor speed, equations"),
-    ("kalman.s", "Kalman filter"),
-    ("lu.s", "linear equations"),
-    ("pendulum.s", "pendulum on a cart"),
-    ("pi.s", "motor speed, PI"),
-    ("statespace.s", "six masses, state space"),
-    ("table.s", "thermistor, table"),
-    ("tracking.s", "five-axis robot"),
-];
-/// Examples whose periods are problems of their own: no line joins the points of a plot.
-const POINTS: [&str; 1] = ["lu.s"];
-/// Examples that solve `A·x = b` in each period, whose residual is plotted first: names of the matrix, the solution, the right-hand side, and
-/// of the output that is 1 where there is no solution.
-const RESIDUAL_OF: [(&str, [&str; 4]); 1] = [("lu.s", ["A", "x", "b", "singular"])];
-/// Number of periods in which an example without a table shows what it does.
-const PERIODS_OF: [(&str, usize); 6] = [
-    ("blink.s", 2000),
-    ("foc.s", 320),
-    ("foc_early.s", 320),
-    ("gains.s", 400),
-    ("pendulum.s", 6000),
-    ("pi.s", 400),
-];
-/// Seconds that assembling takes in a browser, for the page to announce until it has measured them.
-const SECONDS_OF: [(&str, u32); 2] = [("tracking.s", 3), ("statespace.s", 2)];
-/// Plants that close the loops of examples: files of [`takt_programs::PLANTS`], without the extension.
-const PLANT_OF: [(&str, &str); 5] = [
-    ("foc.s", "pmsm"),
-    ("foc_early.s", "pmsm"),
-    ("gains.s", "dc_motor"),
-    ("pendulum.s", "cart_pendulum"),
-    ("pi.s", "dc_motor"),
-];
-/// Ports that are plotted first, where these are not outputs with their references.
-const PLOTTED: [&str; 8] = ["da", "db", "dc", "id", "iq", "id_ref", "iq_ref", "we"];
-const PLOTTED_OF: [(&str, &[&str]); 4] = [
-    ("biquads.s", &["x", "y"]),
-    ("foc.s", &PLOTTED),
-    ("foc_early.s", &PLOTTED),
-    ("pendulum.s", &["force", "angle", "x", "x_ref"]),
+/// What the page knows about an example besides its text.
+struct KnownExample {
+    name: &'static str,
+    /// Title in the menu of examples, where a sentence would not fit.
+    short: &'static str,
+    /// Reader that it is for, and a thing to try; `docs/examples.md` has the same words.
+    text: &'static str,
+    /// Plant that closes the loop: a file of [`takt_programs::PLANTS`], without the extension.
+    plant: Option<&'static str>,
+    /// Number of periods without a table in which it shows what it does.
+    periods: Option<usize>,
+    /// Seconds that assembling takes in a browser, for the page to announce until it has measured them.
+    seconds: Option<u32>,
+    /// Ports that are plotted first, where these are not outputs with their references.
+    plotted: Option<&'static [&'static str]>,
+    /// Its periods solve a problem `A·x = b` each.
+    solves: Option<Solves>,
+}
+
+/// Names of the ports of a program that solves another problem `A·x = b` in each period. No line joins the points of its plots, and its
+/// residual is plotted first.
+struct Solves {
+    matrix: &'static str,
+    solution: &'static str,
+    right: &'static str,
+    /// Output that is 1 where there is no solution.
+    singular: &'static str,
+}
+
+/// Values of the fields that most examples leave out.
+const PLAIN: KnownExample = KnownExample {
+    name: "",
+    short: "",
+    text: "",
+    plant: None,
+    periods: None,
+    seconds: None,
+    plotted: None,
+    solves: None,
+};
+const CURRENTS: &[&str] = &["da", "db", "dc", "id", "iq", "id_ref", "iq_ref", "we"];
+const CONTROL: KnownExample =
+    KnownExample { plant: Some("pmsm"), periods: Some(320), plotted: Some(CURRENTS), ..PLAIN };
+const MOTOR: KnownExample = KnownExample { plant: Some("dc_motor"), periods: Some(400), ..PLAIN };
+
+/// Examples in the order of the menu.
+#[rustfmt::skip]
+const KNOWN: [KnownExample; 12] = [
+    KnownExample { name: "pi.s", short: "motor speed, PI",
+        text: "For makers of speed controllers. Try KP at 0.3, and the speed overshoots; at 2, it arrives too late.", ..MOTOR },
+    KnownExample { name: "gains.s", short: "motor speed, equations",
+        text: "For those who tune while the motor turns. Try \"set from period\" 200, then drag kp: the run changes from there on.", ..MOTOR },
+    KnownExample { name: "tracking.s", short: "five-axis robot",
+        text: "For makers of robots. Try the tab Robot, where it follows its path, and the tab Pipeline, with each cycle of a period.", seconds: Some(3), ..PLAIN },
+    KnownExample { name: "pendulum.s", short: "pendulum on a cart",
+        text: "For makers of machines that balance. Try KA at 15, and the pendulum swings.", plant: Some("cart_pendulum"), periods: Some(6000), plotted: Some(&["force", "angle", "x", "x_ref"]), ..PLAIN },
+    KnownExample { name: "foc.s", short: "motor current",
+        text: "For makers of motor drives. Try wc at 1500, and the currents follow more slowly.", ..CONTROL },
+    KnownExample { name: "blink.s", short: "blinking lamp",
+        text: "For a first look. Try SECONDS at 0.1, and the lamp blinks five times as fast.", periods: Some(2000), ..PLAIN },
+    KnownExample { name: "biquads.s", short: "low-pass filter",
+        text: "For those who filter a measurement. Try FC at 100, and the curve is smoother and later.", plotted: Some(&["x", "y"]), ..PLAIN },
+    KnownExample { name: "foc_early.s", short: "motor current, early",
+        text: "For drives whose duties must be out early. Try the tab Code: what follows the duties is for the next period.", ..CONTROL },
+    KnownExample { name: "kalman.s", short: "Kalman filter",
+        text: "For those who estimate a speed from positions. Try P0 at 0, and the filter takes longer to find it.", ..PLAIN },
+    KnownExample { name: "lu.s", short: "linear equations",
+        text: "For those who solve equations in each period. Try the tab Pipeline: one straight line, whatever the matrix.", solves: Some(Solves { matrix: "A", solution: "x", right: "b", singular: "singular" }), ..PLAIN },
+    KnownExample { name: "statespace.s", short: "six masses, state space",
+        text: "For controllers of many states. Try the tab Pipeline, beside \"on t4\": a third fewer cycles.", seconds: Some(2), ..PLAIN },
+    KnownExample { name: "table.s", short: "thermistor, table",
+        text: "For those who read a sensor that is not linear. Try B at 3000, and a volt is more degrees.", ..PLAIN },
 ];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
@@ -85,36 +109,61 @@ pub(crate) fn source(wanted: Source) -> Result<Value, String> {
     text.ok_or_else(|| format!("there is no file `{name}` to be shown"))
 }
 
+impl KnownExample {
+    /// Description for the page; `None` if no source has the name.
+    fn describe(&self) -> Option<Value> {
+        let text = |name: &str| EXAMPLES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
+        let is_track = self.name == file_name(TRACKING);
+        let (source, table) = if is_track {
+            let tracking = SOURCES.iter().find(|(path, _)| *path == TRACKING);
+            (tracking.map(|(_, text)| *text), Some(takt_programs::TRACKING_INPUTS))
+        } else {
+            (text(self.name), text(&self.name.replace(".s", ".csv")))
+        };
+        let source = source?;
+        // The file of a plant has the inputs that the plant leaves; a recorded table would have columns that nobody reads.
+        let inputs = table.filter(|_| self.plant.is_none());
+        let solves =
+            self.solves.as_ref().map(|ports| [ports.matrix, ports.solution, ports.right, ports.singular]);
+        Some(json!({
+            "name": self.name, "title": title(source), "short": self.short, "text": self.text, "source": source, "inputs": inputs,
+            "periods": self.periods, "seconds": self.seconds, "plotted": self.plotted, "track": is_track,
+            "plant": self.plant.map(|plant| json!({ "name": plant })),
+            "points": solves.is_some(), "residual": solves,
+        }))
+    }
+}
+
 /// Data that the page needs at its start.
 pub(crate) fn about() -> Value {
-    let text = |name: &str| EXAMPLES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
-    let rest =
-        EXAMPLES.iter().map(|(name, _)| *name).filter(|name| name.ends_with(".s") && !FIRST.contains(name));
-    let seconds =
-        |name: &str| SECONDS_OF.iter().find(|(known, _)| *known == name).map(|(_, seconds)| seconds);
-    let plant = |name: &str| PLANT_OF.iter().find(|(known, _)| *known == name).map(|(_, plant)| *plant);
-    let short = |name: &str| SHORT.iter().find(|(known, _)| *known == name).map(|(_, title)| *title);
-    let residual = |name: &str| RESIDUAL_OF.iter().find(|(known, _)| *known == name).map(|(_, ports)| *ports);
-    let plotted = |name: &str| PLOTTED_OF.iter().find(|(known, _)| *known == name).map(|(_, ports)| *ports);
-    let example = |name: &str| {
-        let source = text(name)?;
-        // The file of a plant has the inputs that the plant leaves; a recorded table would have columns that nobody reads.
-        let plant = plant(name);
-        let inputs = if plant.is_some() { None } else { text(&name.replace(".s", ".csv")) };
-        let periods = PERIODS_OF.iter().find(|(known, _)| *known == name).map(|(_, periods)| periods);
-        Some(
-            json!({ "name": name, "title": title(source), "short": short(name), "source": source, "inputs": inputs, "periods": periods, "seconds": seconds(name), "plant": plant.map(|plant| json!({ "name": plant })), "plotted": plotted(name), "points": POINTS.contains(&name), "residual": residual(name), "track": false }),
-        )
-    };
-    let mut examples: Vec<Value> = FIRST.into_iter().chain(rest).filter_map(example).collect();
-    if let Some((path, source)) = SOURCES.iter().find(|(path, _)| *path == TRACKING) {
-        let tracking = json!({ "name": file_name(path), "title": title(source), "short": short(file_name(path)), "source": source, "inputs": takt_programs::TRACKING_INPUTS, "seconds": seconds(file_name(path)), "track": true });
-        examples.insert(2.min(examples.len()), tracking);
-    }
+    let machine = |machine: &&Machine| json!({ "name": machine.name, "text": machine.text });
     json!({
         "version": env!("CARGO_PKG_VERSION"),
-        "machines": MACHINES.iter().map(|machine| json!({ "name": machine.name, "text": machine.text })).collect::<Vec<_>>(),
-        "examples": examples,
+        "machines": MACHINES.iter().map(machine).collect::<Vec<_>>(),
+        "examples": KNOWN.iter().filter_map(KnownExample::describe).collect::<Vec<_>>(),
         "limits": { "cycles": CYCLES, "periods": PERIODS, "source_bytes": SOURCE_BYTES },
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{EXAMPLES, KNOWN, KnownExample, TRACKING, file_name};
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_example_is_in_the_menu() {
+        let menu: BTreeSet<&str> = KNOWN.iter().map(|known| known.name).collect();
+        let shipped = EXAMPLES.iter().map(|(name, _)| *name).filter(|name| name.ends_with(".s"));
+        assert_eq!(menu, shipped.chain([file_name(TRACKING)]).collect());
+        assert!(KNOWN.iter().all(|known| known.describe().is_some()));
+    }
+
+    #[test]
+    fn the_document_has_the_same_words() {
+        let document = include_str!("../../../docs/examples.md");
+        for KnownExample { name, text, .. } in &KNOWN {
+            let row = document.lines().find(|line| line.starts_with(&format!("| `{name}` | ")));
+            assert!(!text.is_empty() && row.is_some_and(|row| row.contains(text)), "{name}: {row:?}");
+        }
+    }
 }

@@ -91,9 +91,10 @@ fn installation(address: Option<&str>) -> String {
              sudo install takt-{VERSION}-{x86}/takt /usr/local/bin\ntakt track\n```\n"
         ),
         None => format!(
-            "From source, with Rust and nothing else ([two commands](#from-source)); the second line makes the playground and says how to \
-             open it:\n\n```sh\ncargo run --release -- track     # the main job, in the terminal\n\
-             cargo xtask web                  # the playground, in target/playground\n```\n\n\
+            "With Rust and nothing else; the second command makes the [playground](docs/playground.md), installs what that needs, and takes some\n\
+             minutes the first time:\n\n\
+             ```sh\ncargo run --release -- track     # the robot along its path, in the terminal\n\
+             cargo xtask web --serve          # the playground, on http://localhost:8000\n```\n\n\
              No release is published yet; `cargo xtask release` writes its files:\n{files}.\n"
         ),
     }

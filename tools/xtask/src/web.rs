@@ -24,6 +24,9 @@ pub(crate) struct Arguments {
     /// Write the documents' pictures of it: docs/pictures/loop.svg, which moves, and docs/pictures/playground.png.
     #[arg(long)]
     pictures: bool,
+    /// Serve it on http://localhost:8000, until Ctrl-C.
+    #[arg(long)]
+    serve: bool,
 }
 
 /// Folder of the finished page; any file server can serve it.
@@ -64,7 +67,15 @@ pub(crate) fn web(arguments: &Arguments) -> Result<()> {
     if arguments.test {
         test(arguments)?;
     }
-    Ok(())
+    match arguments.serve {
+        true => serve(),
+        false => {
+            eprintln!(
+                "the playground is in {PAGE}: `cargo xtask web --serve` serves it, as any file server does"
+            );
+            Ok(())
+        }
+    }
 }
 
 /// Builds the playground's page.
@@ -91,11 +102,13 @@ pub(crate) fn build() -> Result<()> {
         .arg(root().join(LIVE))
         .arg(root().join(PAGE))
         .current_dir(page);
-    progress::step("bundling the playground", || run(&mut bundle))?;
-    eprintln!(
-        "the playground is in {PAGE}: `python3 -m http.server -d {PAGE}` serves it on http://localhost:8000"
-    );
-    Ok(())
+    progress::step("bundling the playground", || run(&mut bundle))
+}
+
+/// Serves the page until somebody ends it.
+fn serve() -> Result<()> {
+    let mut server = Command::new("node");
+    run(server.args(["serve.mjs", "8000"]).arg(root().join(PAGE)).current_dir(packages()?))
 }
 
 /// Draws the pictures of the documents.

@@ -214,7 +214,8 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         }
         files::json(&result, out)?;
     } else if !writes.iter().any(|(_, path)| files::is_dash(path)) {
-        let place = image_path.map_or_else(|| "assembled".to_owned(), |path| path.display().to_string());
+        let place =
+            image_path.map_or_else(|| "assembled".to_owned(), |path| format!("wrote {}", path.display()));
         write_report(&assembled, &place, out)?;
         if let Some(checked) = &verified {
             checked.write(out)?;

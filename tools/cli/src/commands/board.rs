@@ -30,6 +30,7 @@ use std::time::Duration;
 use takt_board::tools::Venv;
 use takt_board::top::ScopeSize;
 use takt_board::{Application, Board, Findings, Mistake, Wiring, project};
+use takt_rtl::estimate::Estimator;
 
 /// List boards and their pins; check, build and simulate a program, or a system of several cores, on a board.
 #[derive(Args)]
@@ -318,9 +319,34 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
             if let Some(scope) = takt_board::top::scope(&board, &wiring, carried.on_board())? {
                 writeln!(out, "{}", scope_text(scope))?;
             }
-            Ok(())
+            Ok(writeln!(out, "{}", cells_text(&board, &carried)?)?)
         }
     }
+}
+
+/// Estimated cells of the cores beside those of the device, without the board's own circuit. The estimates are of the measured family.
+fn cells_text(board: &Board, carried: &application::Application) -> Result<String> {
+    const THEN: &str = "`takt board build` counts all cells";
+    let Some(room) = board.device.room.as_ref().filter(|_| board.family.name == takt_family::REFERENCE.name)
+    else {
+        return Ok(format!("cells: not estimated for the {}; {THEN}", board.family.text));
+    };
+    let estimator = Estimator::new()?;
+    let cores = carried.programs().iter().map(|loaded| estimator.estimate(loaded.program.machine));
+    let cores = cores.collect::<Result<Vec<_>, _>>()?;
+    let luts: f64 = cores.iter().map(|core| core.luts).sum();
+    let block_rams: u64 = cores.iter().map(|core| core.block_rams).sum();
+    let multipliers: u64 = cores.iter().map(|core| core.multipliers).sum();
+    let cores = if cores.len() == 1 { "the core takes" } else { "the cores take" };
+    Ok(format!(
+        "{cores} about {:.0} of {} {}, {block_rams} of {} block RAMs, {multipliers} of {} multipliers of the {} (estimated); {THEN}",
+        (luts / 100.0).round() * 100.0,
+        room.luts,
+        board.family.lut,
+        room.block_rams,
+        room.multipliers,
+        board.device.name
+    ))
 }
 
 /// The scope of a board in a line.

@@ -86,7 +86,8 @@ fn changes(kind: Kind, home: &Path, config: &Path) -> (Vec<Change>, &'static str
     match kind {
         Kind::Neovim => (
             vec![Change::own(config.join("nvim/plugin/takt.lua"), NEOVIM)],
-            "Neovim starts `takt lsp` in Takt's sources; docs/editors.md has the parser for colours by tree-sitter.",
+            "Neovim starts `takt lsp` in Takt's sources; docs/editors.md has the parser for colours by tree-sitter.\n\
+             Next: `nvim programs/examples/pi.s`, or a source of yours.",
         ),
         Kind::Helix => (
             vec![Change {
@@ -94,7 +95,8 @@ fn changes(kind: Kind, home: &Path, config: &Path) -> (Vec<Change>, &'static str
                 contents: helix(),
                 mark: Some("[language-server.takt]"),
             }],
-            "Helix starts `takt lsp` in files *.tks (not tested in Helix itself); docs/editors.md has the grammar for colours.",
+            "Helix starts `takt lsp` in files *.tks (not tested in Helix itself); docs/editors.md has the grammar for colours.\n\
+             Next: `hx law.tks`, a source of yours; `hx --health takt` says whether the server is found.",
         ),
         Kind::Emacs => {
             let (old, new) = (home.join(".emacs.d"), config.join("emacs"));
@@ -106,7 +108,8 @@ fn changes(kind: Kind, home: &Path, config: &Path) -> (Vec<Change>, &'static str
             };
             (
                 vec![Change::own(folder.join("takt.el"), EMACS), init],
-                "`M-x eglot` or `M-x lsp` starts `takt lsp` in a source.",
+                "`M-x eglot` or `M-x lsp` starts `takt lsp` in a source.\n\
+                 Next: `emacs programs/examples/pi.s`, or a source of yours; there `M-x eglot` or `M-x lsp`.",
             )
         }
     }
@@ -128,7 +131,7 @@ pub(crate) fn run(arguments: &Editor, out: &mut Out) -> Result<()> {
         }
     }
     if all.is_empty() {
-        return Ok(writeln!(out, "nothing to do")?);
+        return Ok(writeln!(out, "nothing to do. {then}")?);
     }
     if !arguments.write && !is_agreed(out)? {
         return Ok(writeln!(out, "nothing is written; --write does it")?);

@@ -10,7 +10,7 @@ use crate::run::memory;
 use crate::run::nan::NanWrites;
 use crate::run::outcome::{CoreOutcome, Execution, OutcomeOptions, PlantOutcome, RunOutcome};
 use crate::run::parameters::ParameterArguments;
-use crate::run::plant::{PlantArguments, ProgramLoop};
+use crate::run::plant::{self, PlantArguments, ProgramLoop};
 use crate::run::ports;
 use crate::run::system::LoadedSystem;
 use crate::run::system::observers::Observer;
@@ -20,7 +20,7 @@ use crate::run::trace::TraceArguments;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number;
 use crate::terminal::options::{OptionalMachine, SourceArguments};
-use crate::terminal::output::{self, Failure};
+use crate::terminal::output::{self, Failure, message};
 use crate::terminal::plot::curves::Curves;
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -28,6 +28,7 @@ use std::cell::RefCell;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use takt_analysis::period::PERIOD_LIMIT;
+use takt_asm::units;
 use takt_debug::trace::Tracer;
 use takt_emu::{Emulator, Row, Stop};
 use takt_isa::program::Port;
@@ -196,8 +197,10 @@ impl Run {
         let (inputs, outputs) = (self.inputs.as_deref(), self.shown.outputs.as_deref());
         let result = match self.has_rows() {
             true => {
-                let curves =
-                    self.plot.is_some().then(|| RefCell::new(Curves::new(run.titles(), run.period())));
+                let curves = self
+                    .plot
+                    .is_some()
+                    .then(|| RefCell::new(Curves::new(run.titles(), run.period()).with_units(run.units())));
                 let tables = Tables { inputs, outputs, curves: curves.as_ref(), most: self.periods };
                 let result = tables.drive(&mut run);
                 // What came before a fault is worth a picture.
@@ -205,6 +208,9 @@ impl Run {
                     (&self.plot, curves.filter(|curves| !curves.borrow().is_empty()))
                 {
                     files::write(path, curves.into_inner().draw(&files::input_name(&self.file))?.as_bytes())?;
+                    if !files::is_dash(path) {
+                        message(&format!("the curves are in {}", path.display()));
+                    }
                 }
                 result.map(Some)
             }
@@ -228,8 +234,9 @@ impl Run {
         let (program, max_cycles) = (&loaded.program, self.max_cycles);
         let words =
             self.memory.iter().map(|name| memory::words(loaded, name)).collect::<Result<Vec<_>>>()?.concat();
-        let table = Some(self.file.with_extension("csv")).filter(|table| table.is_file());
         Ok(ProgramRun {
+            file: self.file.clone(),
+            loaded,
             program,
             words,
             emulator,
@@ -240,7 +247,6 @@ impl Run {
             periods,
             last: 0,
             plant,
-            table,
         })
     }
 
@@ -261,6 +267,8 @@ const NO_PERIODS: CorePeriods = CorePeriods { count: 0, shortest: 0, longest: 0,
 
 /// A run of a program.
 struct ProgramRun<'a, 't> {
+    file: PathBuf,
+    loaded: &'a LoadedProgram,
     program: &'a Program,
     /// Data words to show in the results.
     words: Vec<memory::Word>,
@@ -273,8 +281,6 @@ struct ProgramRun<'a, 't> {
     /// Cycles of the last period.
     last: Cycle,
     plant: Option<ProgramLoop>,
-    /// Table of inputs beside the program: the file of its name that ends in `.csv`.
-    table: Option<PathBuf>,
 }
 
 impl ProgramRun<'_, '_> {
@@ -300,6 +306,18 @@ impl ProgramRun<'_, '_> {
 
 impl TableApplication for ProgramRun<'_, '_> {
     const ROWS: &'static str = "periods";
+
+    fn units(&self) -> Vec<Option<String>> {
+        let ports = |directive: &'static str, ports: &'_ [Port]| {
+            let unit = move |port: &Port| units::unit(&self.loaded.sources, directive, &port.name);
+            ports.iter().map(unit).collect::<Vec<_>>()
+        };
+        let outputs =
+            ports(".output", &self.program.outputs).into_iter().chain(self.words.iter().map(|_| None));
+        let Some(plant) = &self.plant else { return outputs.collect() };
+        let inputs = ports(".input", &self.program.inputs).into_iter();
+        inputs.chain(outputs).chain(plant.state_units()).collect()
+    }
 
     fn inputs(&self) -> Vec<Port> {
         match &self.plant {
@@ -357,7 +375,9 @@ impl TableApplication for ProgramRun<'_, '_> {
 
 impl<'a> Execution<'a> for ProgramRun<'a, '_> {
     fn period(&self) -> Option<f64> {
-        self.plant.as_ref().map(ProgramLoop::period)
+        let LoadedProgram { sources, constants, .. } = self.loaded;
+        let plant = self.plant.as_ref().map(ProgramLoop::period);
+        plant.or_else(|| units::sampling_period(sources, constants))
     }
 
     fn run_to_halt(&mut self) -> Result<()> {
@@ -368,11 +388,18 @@ impl<'a> Execution<'a> for ProgramRun<'a, '_> {
         self.nans.add(&self.emulator.take_nan_writes());
         match stop? {
             Stop::Idle => {
-                let table = self.table.as_ref();
-                let beside = table.map_or(String::new(), |table| {
-                    format!(", such as `--inputs {}`, which lies beside it", table.display())
-                });
-                bail!("the program waits for the tick: give it periods with --inputs or --periods{beside}")
+                let plant = plant::beside(&self.file, self.loaded);
+                let plant = plant.map(|path| format!("`--plant {} --periods 400`", path.display()));
+                let table = Some(self.file.with_extension("csv")).filter(|table| table.is_file());
+                let table = table.map(|path| format!("`--inputs {}`", path.display()));
+                let known: Vec<String> = plant.into_iter().chain(table).collect();
+                let beside = match known.is_empty() {
+                    true => String::new(),
+                    false => format!(", such as {}", known.join(" or ")),
+                };
+                bail!(
+                    "the program waits for the tick: give it periods with --plant, --inputs or --periods{beside}"
+                )
             }
             _ => Ok(()),
         }

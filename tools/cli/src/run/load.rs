@@ -78,7 +78,16 @@ impl Load {
         if image::is_image(&bytes) {
             bail!("{} is an image already; `takt disasm` turns it into source", files::input_name(path));
         }
+        Load::may_be_source(path, &bytes)?;
         Ok(bytes)
+    }
+
+    /// Rejects a file that is neither a source nor an image.
+    fn may_be_source(path: &Path, bytes: &[u8]) -> Result<()> {
+        match takt_asm::foreign(&files::input_name(path), bytes) {
+            Some(why) => bail!("{why}"),
+            None => Ok(()),
+        }
     }
 
     /// Loads a program: from an image, or from a source, which is assembled.
@@ -96,6 +105,7 @@ impl Load {
             let DebugInfo { sources, constants, names } = debug.unwrap_or_default();
             LoadedProgram { program, constants, sources, names, spilled: Vec::new() }
         } else {
+            Load::may_be_source(path, &bytes)?;
             let kept = self.assembled_program(path, bytes, false);
             kept.map_err(|mistakes| Failure::Diagnostics(mistakes.render(self.color)))?.loaded
         };

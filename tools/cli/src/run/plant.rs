@@ -10,6 +10,7 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use takt_asm::units;
+use takt_isa::Program;
 use takt_programs::plants::file::{TEXT_BYTES, is_fmu};
 use takt_programs::plants::{ClosedLoop, Interface, Plant, PlantFile};
 
@@ -63,6 +64,24 @@ impl PlantArguments {
         connection.complete(|_| has_table).map_err(Failure::Usage)?;
         Ok(Some(ClosedLoop::new(plant, interface, connection, period)))
     }
+}
+
+/// Plant in the folder `plant` beside a program that gives all of the program's input ports and takes its outputs.
+pub(crate) fn beside(file: &Path, loaded: &LoadedProgram) -> Option<PathBuf> {
+    let period = units::sampling_period(&loaded.sources, &loaded.constants)?;
+    let entries = std::fs::read_dir(file.with_file_name("plant")).ok()?.flatten();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| is_system(path)).collect();
+    paths.sort();
+    paths.into_iter().find(|path| {
+        let fits = || {
+            let text = String::from_utf8(files::read(path, TEXT_BYTES).ok()?).ok()?;
+            let plant = PlantFile::read(&files::input_name(path), &text).ok()?;
+            let (_, interface) = plant.simulation(period).ok()?;
+            let Program { inputs, outputs, .. } = &loaded.program;
+            plant.connect(&interface, inputs, outputs, &[]).ok()?.complete(|_| false).ok()
+        };
+        fits().is_some()
+    })
 }
 
 /// Signals and ports of --connect.

@@ -30,6 +30,11 @@ pub(crate) trait TableApplication {
         Vec::new()
     }
 
+    /// Units of the columns of the output table, as far as they are known.
+    fn units(&self) -> Vec<Option<String>> {
+        Vec::new()
+    }
+
     /// Runs up to the time of the first row.
     fn begin(&mut self) -> Result<()> {
         Ok(())

@@ -83,10 +83,9 @@ export class Documents {
     return document;
   }
 
-  /** Shows a list of the documents if there are several, each with buttons to open and close; `here` is the one on display. */
+  /** Shows a list of the documents, each with buttons to open and close; `here` is the one on display. */
   show(parent, here, open, close) {
     const all = this.list(), button = (set) => Object.assign(document.createElement("button"), set);
-    parent.hidden = all.length < 2;
     parent.replaceChildren(...all.map((one) => {
       const origin = { link: "from a link", example: "example" }[one.from] ?? "";
       const name = button({ textContent: one.name, title: `${one.name}${origin && `, ${origin}`}${one.changed ? ", changed by you" : ""}`, onclick: () => one.id === here || open(one) });

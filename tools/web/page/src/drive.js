@@ -44,18 +44,11 @@ export class Drive {
     return !this.driving && !this.tried;
   }
 
-  /** Sets, before the first drive, whether the program can drive the robot. */
-  set fits(on) {
+  /** Says, before the first drive, what there is to drive. */
+  offer() {
     if (!this.idle) return;
-    this.offers(on);
-    if (on) this.prepare(false);
-    el("drove").replaceChildren(on ? "The program as the controller of the five-axis hybrid robot, in a closed loop." : "This program has other ports than a controller of the five-axis hybrid robot. The example ");
-    if (!on) el("drove").append(Object.assign(document.createElement("a"), { href: "#example=tracking.s", textContent: "tracking.s" }), " is one.");
-  }
-
-  /** Shows the panel's controls if there is something to drive. */
-  offers(on) {
-    el("drive").hidden = el("scene").hidden = el("time").parentElement.hidden = !on;
+    this.prepare(false);
+    el("drove").textContent = "The program as the controller of the five-axis hybrid robot, in a closed loop.";
   }
 
   /** Discards the drive. */
@@ -84,7 +77,6 @@ export class Drive {
       this.robot.begin(drive.base, drive.sample_time, drive.poses);
       if (!whole) return this.robot.draw();
       this.tried = this.built = true;
-      this.offers(true);
       this.robot.over = false;
       this.starts();
       this.robot.add(drive.poses);

@@ -140,19 +140,26 @@ async function light() {
   }
 }
 
+/** Offers the tab of the robot if the program can drive it. */
+function offerRobot(on) {
+  el("tab-robot").hidden = !on;
+  if (!on && state.tab === "robot") select("plot");
+}
+
 /** Drives the robot if its panel is visible, nothing has been driven yet, and the program can drive it. */
 function driveFirst() {
   if (state.tab === "robot" && !state.opening && !state.stale && state.program?.tracks && !state.program.inputs_error && drive.idle) drive.drive();
 }
 
-for (const [i, tab] of tabs.entries()) {
+for (const tab of tabs) {
   const name = tab.getAttribute("aria-controls");
   tab.addEventListener("click", () => select(name));
   tab.addEventListener("keydown", (event) => {
+    const shown = tabs.filter(({ hidden }) => !hidden), i = shown.indexOf(tab);
     const to = { ArrowRight: i + 1, ArrowLeft: i - 1, Home: 0, End: tabs.length - 1 }[event.key];
     if (to === undefined) return;
     event.preventDefault();
-    select(tabs[(to + tabs.length) % tabs.length].getAttribute("aria-controls"), true);
+    select(shown.at(to % shown.length).getAttribute("aria-controls"), true);
   });
 }
 
@@ -178,6 +185,7 @@ function changed(event) {
     plots.before = null;
   }
   // A reported mistake also belongs to the previous text.
+  const wrong = el("cycles").className === "early";
   el("cycles").className = "";
   if (!state.opening) {
     state.dirty = true;
@@ -191,7 +199,7 @@ function changed(event) {
   clearTimeout(state.soon);
   if (state.tuning) return follow();
   if (event !== "later") state.soon = setTimeout(again, PAUSE);
-  el("wait").hidden = state.took <= SOON;
+  el("wait").hidden = wrong || state.took <= SOON;
 }
 
 /** Computes the results of a slider: each at once, or, if they take long, that of the slider's rest. */
@@ -296,6 +304,7 @@ async function open({ name, source, inputs, periods, plant, parameters, changes,
   // The menu says which example is open, and offers it again.
   const example = state.about.examples.find((one) => one.name === state.name && one.source === source);
   el("example").options[0].textContent = example ? `${example.name}: ${example.short}` : "open one …";
+  el("try").textContent = example?.text ?? "";
   el("example").title = example?.title ?? "Programs that come with Takt";
   const opened = editor.open(state.name, source, el("machine").value);
   changed("later");
@@ -304,6 +313,7 @@ async function open({ name, source, inputs, periods, plant, parameters, changes,
   state.kept = null;
   showSides();
   empty();
+  offerRobot(example?.track ?? false);
   if (isDriven(state.opened)) drive.prepare(true);
   await assemble();
   await opened;
@@ -315,8 +325,9 @@ const isShipped = (example, wanted) => JSON.stringify(shipped(example, PERIODS))
 /** The build has driven the robot with this program. */
 const isDriven = (wanted) => state.about.examples.some((one) => one.track && isShipped(one, wanted));
 
-/** Seconds that assembling has taken, beside those that it usually takes. */
-function elapsed(now, usual) {
+/** Seconds that assembling has taken, beside those that it took here before, or else takes where nothing else runs. */
+function elapsed(now, { usual, idle }) {
+  if (idle) return `, ${now ? `${now} s so far; ` : ""}${idle} s on an idle computer`;
   if (!now) return usual ? `, about ${usual} s` : "";
   return !usual ? `, ${now} s` : now <= usual ? `, ${now} of about ${usual} s` : `, ${now} s, longer than the usual ${usual} s`;
 }
@@ -370,10 +381,11 @@ const times = () => {
 };
 const timed = () => `${state.name} ${el("machine").value.slice(0, 20)}`;
 
-/** Seconds that assembling the text took the last time, or takes elsewhere; undefined below one second. */
+/** Seconds that assembling the text took the last time (`usual`), or takes on an idle computer (`idle`); neither below one second. */
 function seconds() {
-  const took = times()[timed()] ?? state.about.examples.find(({ name, source }) => name === state.name && source === editor.text)?.seconds;
-  return took >= 1 ? Math.round(took) : undefined;
+  const took = times()[timed()];
+  if (took !== undefined) return { usual: Math.round(took) };
+  return { idle: state.about.examples.find(({ name, source }) => name === state.name && source === editor.text)?.seconds };
 }
 
 /** Keeps the time of a result that took long. */
@@ -398,6 +410,8 @@ function showMistake(why, text) {
 function showWrong(first, more, by) {
   const out = el("cycles");
   out.className = by;
+  // Whoever is to mend a mistake is not to assemble it again.
+  el("wait").hidden = true;
   out.replaceChildren(Object.assign(document.createElement("b"), { textContent: "does not assemble" }), first ? `: ${first}${more ? ` (${more} more in Messages)` : ""}` : ": see Messages");
   el("more").hidden = true;
 }
@@ -410,6 +424,7 @@ function diagnosed(mistakes) {
   else if (state.shown && !state.tuning) {
     showCycles(state.shown);
     showMistake();
+    el("wait").hidden = state.took <= SOON;
   }
 }
 
@@ -487,7 +502,10 @@ function showProgram(program) {
   }
   // The build's drive is that of the same program.
   drive.old = whole && !(drive.built && isDriven(asked()));
-  if (whole) drive.fits = program.tracks;
+  if (whole) {
+    offerRobot(program.tracks);
+    if (program.tracks) drive.offer();
+  }
   dimPipeline();
   if (!whole || !state.tuning) showCycles();
 }

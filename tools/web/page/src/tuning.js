@@ -5,6 +5,8 @@ import { initial, isNumber, node, short } from "./parts.js";
 
 /** Significant digits of a slider's steps: a hundredth of the power of ten below its range. */
 const DIGITS = 2;
+/** Pause after which a key press on a slider begins another movement, to be compared with the state before it; ms. */
+const RUN = 2000;
 
 /** Text of a value in the source; a real number stays one. */
 function written(constant, value) {
@@ -50,6 +52,8 @@ export class Tuning {
 
   set enabled(on) {
     this.list.disabled = !on;
+    // The text was changed otherwise: a movement does not go on.
+    if (!on) this.last = null;
   }
 
   /** Forgets the values before the changes: another text is opened. */
@@ -57,6 +61,7 @@ export class Tuning {
     this.originals.clear();
     this.rows.clear();
     this.moving = false;
+    this.last = null;
     this.box.hidden = true;
   }
 
@@ -86,13 +91,19 @@ export class Tuning {
         row.put(Number(field.value));
       });
     }
+    slider.addEventListener("pointerdown", () => (this.last = null));
     slider.addEventListener("input", () => {
-      if (!this.moving) this.start(row);
+      // Each press of a key is an input and a change: together they are one movement.
+      const goesOn = this.moving || (this.last?.row === row && performance.now() - this.last.at < RUN);
+      if (!goesOn) this.start(row);
       this.moving = true;
       field.value = short(Number(slider.value));
       this.set(row, Number(slider.value));
     });
-    slider.addEventListener("change", () => (this.moving = false));
+    slider.addEventListener("change", () => {
+      this.moving = false;
+      this.last = { row, at: performance.now() };
+    });
     field.addEventListener("change", () => {
       if (!isNumber(field.value)) return row.put(row.constant.value);
       this.start(row);
@@ -117,6 +128,7 @@ export class Tuning {
   /** Gives all constants the texts that they had before the changes. */
   reset() {
     if (!this.isChanged()) return;
+    this.last = null;
     if (this.resets) {
       this.begins("what was set");
       this.resets();

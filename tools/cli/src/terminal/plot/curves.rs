@@ -6,14 +6,17 @@ use crate::terminal::number::rounded;
 use anyhow::{Result, anyhow};
 use plotters::prelude::*;
 
-/// Height of a chart in pixels, and of the title.
-const HEIGHT: u32 = 150;
+/// Height in pixels of a chart with its names, of the names, and of the title.
+const HEIGHT: u32 = 160;
+const NAMES: u32 = 18;
 const TITLE: u32 = 40;
+/// Place of a chart's names from the left, in pixels: above the axis.
+const LEFT: u32 = 72;
+/// Relative difference of two columns that are the same but for the rounding to binary32.
+const SAME: f64 = 1e-6;
 /// Most charts; further columns are left out.
 const CHARTS: usize = 40;
-/// Characters beside a chart.
-const NAME: usize = 18;
-/// Width of a character in a chart's labels, in pixels.
+/// Width of a character in a chart's names, in pixels.
 const LABEL: u32 = 8;
 /// Characters of a line of constants, and its height in pixels.
 const LINE: usize = 110;
@@ -40,6 +43,8 @@ struct Stretch {
 /// Columns of numbers, thinned out as they grow: each point is a stretch of periods with its least and its largest values.
 pub(crate) struct Curves {
     titles: Vec<String>,
+    /// Units of the columns, as far as they are known.
+    units: Vec<Option<String>>,
     /// Length of a period in s; without it, the axis counts periods.
     period: Option<f64>,
     /// Periods of a stretch.
@@ -55,7 +60,12 @@ fn array(name: &str) -> Option<&str> {
 
 impl Curves {
     pub(crate) fn new(titles: Vec<String>, period: Option<f64>) -> Curves {
-        Curves { titles, period, every: 1, rows: 0, stretches: Vec::new() }
+        Curves { titles, units: Vec::new(), period, every: 1, rows: 0, stretches: Vec::new() }
+    }
+
+    /// Gives the columns their units.
+    pub(crate) fn with_units(self, units: Vec<Option<String>>) -> Curves {
+        Curves { units, ..self }
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -110,7 +120,7 @@ impl Curves {
         };
         let signal_of = |reference: &str| self.titles.iter().position(|name| follows(name, reference));
         for (column, name) in self.titles.iter().enumerate() {
-            if signal_of(name).is_some() {
+            if signal_of(name).is_some() || self.is_repeated(column) {
                 continue;
             }
             if let Some(of) = arrays[column] {
@@ -133,30 +143,48 @@ impl Curves {
             self.charts().into_iter().partition(|columns| columns.iter().any(changes));
         let words = still.into_iter().flatten().map(|column| {
             let value = self.range(column).map_or_else(|| "no number".to_owned(), |(low, _)| rounded(low, 6));
-            format!("{} = {value}", self.titles[column])
+            format!("{} = {value} {}", self.titles[column], self.unit(&[column])).trim_end().to_owned()
         });
         (moving, words.collect())
     }
 
-    /// Name beside a chart: that of the column, without its plant or peripheral if the chart is too low for it.
-    fn name(&self, columns: &[usize]) -> String {
-        if let Some(of) = self.array(columns) {
-            let whole = of.chars().count() > NAME;
-            return if whole { of.rsplit('.').next().unwrap_or(of) } else { of }.to_owned();
-        }
-        let joined = |short: bool| {
-            let names = columns.iter().map(|column| self.titles[*column].as_str());
-            let last = |name| if short { str::rsplit(name, '.').next().unwrap_or(name) } else { name };
-            names.map(last).collect::<Vec<_>>().join(" over ")
+    /// Names above a chart, each in the colour of its curve; of an array, its own name and the indices.
+    fn names(&self, columns: &[usize]) -> Vec<(&str, RGBColor)> {
+        let of = self.array(columns);
+        let name = |column: usize| {
+            let whole = self.titles[column].as_str();
+            let index = whole.rsplit('[').next().map(|index| index.trim_end_matches(']'));
+            index.filter(|_| of.is_some()).unwrap_or(whole)
         };
-        let whole = joined(false);
-        if whole.chars().count() > NAME { joined(true) } else { whole }
+        let array = of.map(|name| (name, BLACK));
+        array.into_iter().chain(columns.iter().map(|column| name(*column)).zip(COLORS)).collect()
     }
 
     /// Name of the array whose elements a chart has.
     fn array(&self, columns: &[usize]) -> Option<&str> {
         let of = array(&self.titles[*columns.first()?])?;
         columns.iter().all(|column| array(&self.titles[*column]) == Some(of)).then_some(of)
+    }
+
+    /// Unit of the columns of a chart, if it is one.
+    fn unit(&self, columns: &[usize]) -> &str {
+        let unit = |column: &usize| self.units.get(*column).and_then(Option::as_deref).unwrap_or_default();
+        let first = columns.first().map_or("", unit);
+        if columns.iter().all(|column| unit(column) == first) { first } else { "" }
+    }
+
+    /// A plant's state that the column of the same name shows, too: a sensor without an error.
+    fn is_repeated(&self, column: usize) -> bool {
+        let Some((_, signal)) = self.titles[column].split_once('.') else { return false };
+        let Some(shown) = self.titles.iter().position(|name| name == signal) else { return false };
+        let is_near = |(a, b): ((f64, f64), (f64, f64))| {
+            let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(b.abs());
+            near(a.0, b.0) && near(a.1, b.1)
+        };
+        self.stretches.iter().all(|Stretch { ranges }| match (ranges[column], ranges[shown]) {
+            (Some(a), Some(b)) => is_near((a, b)),
+            (a, b) => a.is_none() && b.is_none(),
+        })
     }
 
     /// The picture.
@@ -204,8 +232,15 @@ impl Curves {
             let (low, high) =
                 ranges.reduce(|(low, high), (a, b)| (low.min(a), high.max(b))).unwrap_or((0.0, 1.0));
             let margin = if high > low { 0.06 * (high - low) } else { 1.0 };
+            let (names, area) = area.split_vertically(px(NAMES));
+            let mut left = LEFT;
+            for (name, color) in self.names(columns) {
+                let style = font(14).with_color(color).into_text_style(&names);
+                names.draw_text(name, &style, (px(left) as i32, px(2) as i32))?;
+                left += LABEL * (name.chars().count() as u32 + 2);
+            }
             let mut chart = chart(&area).build_cartesian_2d(0.0..end, low - margin..high + margin)?;
-            mesh(&mut chart, if number + 1 == charts.len() { label } else { "" }, &self.name(columns))?;
+            mesh(&mut chart, if number + 1 == charts.len() { label } else { "" }, self.unit(columns))?;
             // The reference lies below.
             for (column, color) in columns.iter().zip(COLORS).rev() {
                 // Steps, as the values are held; a stretch of many periods has both of its ends.
@@ -215,16 +250,6 @@ impl Curves {
                     Some([(from, low), (from, high), (to, high)])
                 });
                 chart.draw_series(LineSeries::new(points.flatten(), color.stroke_width(px(1))))?;
-            }
-            if self.array(columns).is_some() {
-                let mut right = SIZE - LABEL;
-                for (column, color) in columns.iter().zip(COLORS).rev() {
-                    let index =
-                        self.titles[*column].rsplit('[').next().unwrap_or_default().trim_end_matches(']');
-                    right = right.saturating_sub(LABEL * index.chars().count() as u32 + 2 * LABEL);
-                    let style = font(13).with_color(color).into_text_style(&area);
-                    area.draw_text(index, &style, (px(right) as i32, 0))?;
-                }
             }
         }
         root.present()?;
@@ -256,7 +281,7 @@ mod tests {
         assert!(svg.contains("a &amp; b") && svg.contains("time, s"), "{}", &svg[..300]);
     }
 
-    /// Constant columns take a line of text, and a reference lies below its signal.
+    /// Constant columns take a line of text, and a reference lies below its signal; both have units.
     #[test]
     fn constants_are_words_and_references_share_a_chart() {
         let titles = ["id_ref", "motor.id", "tripped", "w_ref", "w"].map(str::to_owned);
@@ -265,8 +290,24 @@ mod tests {
             curves.add(&["0", &row.to_string(), "1", &row.to_string(), "2"].map(str::to_owned));
         }
         assert_eq!(curves.parted(), (vec![vec![1, 0], vec![4, 3]], vec!["tripped = 1".to_owned()]));
+        let units = [Some("A"), Some("A"), Some("V"), Some("rad/s"), Some("rad/s")];
+        let curves = curves.with_units(units.map(|unit| unit.map(str::to_owned)).to_vec());
         let svg = curves.draw("loop").unwrap();
-        assert!(["id over id_ref", "w over w_ref", "tripped = 1"].iter().all(|text| svg.contains(text)));
+        let texts = ["motor.id", "id_ref", "A", "w", "w_ref", "rad/s", "tripped = 1 V", "time, s"];
+        let missing: Vec<_> = texts.iter().filter(|text| !svg.contains(&format!("\n{text}\n"))).collect();
+        assert!(missing.is_empty(), "{missing:?} in {svg}");
+    }
+
+    /// A state that a port shows, too, is drawn once, unless the sensor has an error.
+    #[test]
+    fn a_state_is_no_second_curve_of_its_sensor() {
+        let titles = ["w", "x", "motor.w", "motor.x"].map(str::to_owned);
+        let mut curves = Curves::new(titles.to_vec(), Some(1e-3));
+        for row in 0..10 {
+            let (w, x) = (f64::from(row) / 3.0, f64::from(row));
+            curves.add(&[(w as f32).to_string(), x.to_string(), w.to_string(), (x + 0.5).to_string()]);
+        }
+        assert_eq!(curves.parted().0, [[0], [1], [3]]);
     }
 
     /// Elements of an array share a chart, each in its colour, with its index.
