@@ -22,6 +22,8 @@ pub struct Pin {
     pub optional: bool,
     /// Output of a register that the module does not read: the register may lie at the device's pin.
     pub is_register: bool,
+    /// Parameter whose value is the level that switches off what is at the pin; 0 is that level without a parameter.
+    pub off: Option<&'static str>,
 }
 
 /// Register of 32 bits: port `r_<name>` of the module if the program reads it, `w_<name>` if the program writes it.
@@ -106,15 +108,19 @@ pub struct Kind {
 }
 
 const fn input(name: &'static str) -> Pin {
-    Pin { name, direction: Direction::Input, optional: false, is_register: false }
+    Pin { name, direction: Direction::Input, optional: false, is_register: false, off: None }
 }
 
 const fn output(name: &'static str) -> Pin {
-    Pin { name, direction: Direction::Output, optional: false, is_register: false }
+    Pin { name, direction: Direction::Output, optional: false, is_register: false, off: None }
 }
 
 const fn register_output(name: &'static str) -> Pin {
     Pin { is_register: true, ..output(name) }
+}
+
+const fn off(parameter: &'static str, pin: Pin) -> Pin {
+    Pin { off: Some(parameter), ..pin }
 }
 
 const fn optional(pin: Pin) -> Pin {
@@ -244,12 +250,12 @@ pub const KINDS: &[Kind] = &[
         module: "takt_pwm3",
         text: "three half bridges on a carrier, with dead time",
         pins: &[
-            output("high_a"),
-            optional(output("low_a")),
-            output("high_b"),
-            optional(output("low_b")),
-            output("high_c"),
-            optional(output("low_c")),
+            off("invert_high", output("high_a")),
+            optional(off("invert_low", output("low_a"))),
+            off("invert_high", output("high_b")),
+            optional(off("invert_low", output("low_b"))),
+            off("invert_high", output("high_c")),
+            optional(off("invert_low", output("low_c"))),
         ],
         reads: &[],
         writes: &[
@@ -490,7 +496,7 @@ pub const KINDS: &[Kind] = &[
         name: "digital-out",
         module: "takt_digital_out",
         text: "one pin, on or off",
-        pins: &[register_output("out")],
+        pins: &[off("safe", register_output("out"))],
         reads: &[],
         writes: &[register("level", "0: off, else on")],
         parameters: &[parameter("safe", 0, 1, 0, "the pin while the drive is not enabled")],

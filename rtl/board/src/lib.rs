@@ -76,6 +76,8 @@ pub const VERILOG: &[(&str, &str)] = &[
     ("takt_tick.v", include_str!("../verilog/takt_tick.v")),
     ("takt_tick_divider.v", include_str!("../verilog/takt_tick_divider.v")),
     ("takt_trip.v", include_str!("../verilog/takt_trip.v")),
+    ("takt_watchdog.v", include_str!("../verilog/takt_watchdog.v")),
+    ("takt_clock_watch.v", include_str!("../verilog/takt_clock_watch.v")),
     ("takt_uart_receive.v", include_str!("../verilog/takt_uart_receive.v")),
     ("takt_uart_send.v", include_str!("../verilog/takt_uart_send.v")),
 ];

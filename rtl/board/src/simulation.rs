@@ -6,7 +6,7 @@ use crate::boards::Board;
 use crate::kind::Direction;
 use crate::protocol::{self, Line};
 use crate::safety_watch::{self, Watch};
-use crate::top::{self, TOP, TopError};
+use crate::top::{self, OSCILLATOR, TOP, TopError, simulated_oscillator};
 use crate::wiring::Wiring;
 use std::fmt::Write as _;
 use std::fs;
@@ -446,7 +446,11 @@ fn build(
     }
     let watched = watch.map_or_else(|| "#define CORES 0\n#define SEEN 0\n".to_owned(), Watch::header);
     let kept = watch.map_or_else(|| "`verilator_config\n".to_owned(), Watch::configuration);
-    let verilog = verilog.into_iter().map(|file| (file.name.as_str(), file.text.as_str()));
+    let oscillator = simulated_oscillator(board, wiring);
+    let verilog = verilog.into_iter().map(|file| match &oscillator {
+        Some(text) if file.name == OSCILLATOR => (OSCILLATOR, text.as_str()),
+        _ => (file.name.as_str(), file.text.as_str()),
+    });
     let sources = Sources {
         name: TOP,
         top: TOP,

@@ -50,6 +50,8 @@ pub struct Wiring {
     pub deadlines: u32,
     /// Number of periods without a request of the host that makes the outputs safe; 0 for no limit.
     pub host: u32,
+    /// The device's own oscillator watches the clock; pins go off when it stops.
+    pub clock_watch: bool,
     /// The host can read registers and data memory of the cores, which then have shadow memories.
     pub observe: bool,
     /// Pins of the board for the signals of [`SIGNALS`], in the order of that table.
@@ -102,7 +104,7 @@ pub struct Signal {
 }
 
 /// The signals that a wiring can connect to pins.
-pub const SIGNALS: [Signal; 5] = [
+pub const SIGNALS: [Signal; 6] = [
     Signal { name: "drive", direction: Direction::Output, text: "1: the outputs drive" },
     Signal { name: "fault", direction: Direction::Output, text: "1: the program has stopped with a fault" },
     Signal {
@@ -116,6 +118,11 @@ pub const SIGNALS: [Signal; 5] = [
         text: "1, or open: the outputs are safe, until the next start",
     },
     Signal { name: "tick", direction: Direction::Output, text: "high for a cycle at each tick" },
+    Signal {
+        name: "watchdog",
+        direction: Direction::Output,
+        text: "changes with each period whose outputs drive, for a watchdog beside the FPGA",
+    },
 ];
 
 /// A peripheral of a wiring.
@@ -195,6 +202,7 @@ impl Wiring {
             autostart: false,
             deadlines: 1,
             host: 0,
+            clock_watch: false,
             observe: true,
             signals: [const { None }; SIGNALS.len()],
             carriers: Vec::new(),
@@ -207,6 +215,12 @@ impl Wiring {
     /// The peripherals that trip others, in the order of the file: as the bits of the board's register `trips`.
     pub fn trips(&self) -> impl DoubleEndedIterator<Item = &Peripheral> {
         self.peripherals.iter().filter(|peripheral| peripheral.kind.strobes.trips)
+    }
+
+    /// The pin of a signal of [`SIGNALS`]; `None` if it has none.
+    pub fn signal(&self, name: &str) -> Option<&str> {
+        let at = SIGNALS.iter().position(|signal| signal.name == name)?;
+        self.signals[at].as_deref()
     }
 
     /// The name of the peripheral's pin, or signal, at a pin of the board: `motor.high`, `drive`.
@@ -482,6 +496,7 @@ impl<'a> Reader<'a> {
             self.check_alone(top);
         }
         let observe = top.boolean("observe").map_or(uart, |at| at.value);
+        let clock_watch = self.clock_watch(top);
         let mut signals = [const { None }; SIGNALS.len()];
         if let Some(table) = top.table("signals") {
             for (signal, pin) in SIGNALS.iter().zip(&mut signals) {
@@ -509,6 +524,7 @@ impl<'a> Reader<'a> {
             autostart,
             deadlines,
             host,
+            clock_watch,
             observe,
             signals,
             tick: self.carriers.tick.map(|(tick, _)| tick),
@@ -537,6 +553,21 @@ impl<'a> Reader<'a> {
                 self.document.mistake(&place, text);
             }
         }
+    }
+
+    /// The key `clock_watch`, for a device with an oscillator.
+    fn clock_watch(&self, top: &Table<'a>) -> bool {
+        let Some(at) = top.boolean("clock_watch").filter(|at| at.value) else { return false };
+        let family = self.board.family;
+        if family.oscillator.is_none() {
+            let text = format!(
+                "`clock_watch` needs an oscillator within the device, which {} does not have: the signal `watchdog` is for a \
+                 watchdog beside the FPGA",
+                family.text
+            );
+            self.document.mistake(&at.place, text);
+        }
+        true
     }
 
     /// The table `[scope]`: channels and samples are powers of two.

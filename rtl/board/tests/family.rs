@@ -74,6 +74,7 @@ const MADE_UP: Family = Family {
         logic: None,
     },
     lut: "LUT3",
+    cells_per_flip_flop: None,
     multiplier: [9, 9],
     carry: None,
     initial_registers: true,

@@ -2,6 +2,7 @@
 //! Integration tests of the crate, in one executable: a module for each subject.
 
 mod carrier;
+mod clock;
 mod consistency;
 mod devices;
 mod drive;

@@ -381,7 +381,7 @@ const FAULTS: &[&[(&str, &str, &str)]] = &[
         ("takt_pwm.v", "on[16:1] + {15'd0, on[0]}", "on[16:1]"),
         ("takt_sigma_delta.v", "|wanted[32:16] ? 17'd65536", "|wanted[32:16] ? 17'd65535"),
         ("takt_digital_in.v", "pin_in ^ (INVERT != 0)", "pin_in"),
-        ("takt_digital_out.v", "SAFE != 0;", "1'b0;"),
+        ("takt_digital_out.v", "pin_out <= SAFE != 0;", "pin_out <= 1'b0;"),
         ("takt_spi.v", "~active & half != END - 7'd1", "~active"),
         ("takt_ssi.v", "number == BETWEEN;", "number == END;"),
         ("takt_biss_c.v", "s1 ^ is_crc;", "s1;"),

@@ -16,6 +16,8 @@ module takt_digital_out #(
     output reg         pin_out
 );
 
+    initial pin_out = SAFE != 0;  // before the first clock edge, too
+
     always @(posedge clk) begin
         if (put) pin_out <= |w_level;
         if (rst | ~enable) pin_out <= SAFE != 0;

@@ -30,6 +30,8 @@ module takt_pwm #(
     localparam [15:0] FIRST = HALF;
     localparam [7:0]  LATE  = DEAD;
 
+    initial {pin_high, pin_low} = 2'b00;  // off before the first clock edge, too
+
     // on, with saturation; 33 bits so that nothing wraps.
     wire signed [33:0] wanted = $signed({{2{w_duty[31]}}, w_duty}) + $signed({17'd0, ZERO});
     reg  [16:0] next, on;

@@ -17,6 +17,8 @@ module takt_sigma_delta #(
     output reg         pin_out
 );
 
+    initial pin_out = 1'b0;  // before the first clock edge, too
+
     localparam [16:0] ZERO = SIGNED != 0 ? 17'd32768 : 17'd0;
 
     wire signed [33:0] wanted = $signed({{2{w_value[31]}}, w_value}) + $signed({17'd0, ZERO});

@@ -53,6 +53,9 @@ pub struct Family {
     pub memories: Memories,
     /// Name of the look-up table in rows of measurements: `LUT4`.
     pub lut: &'static str,
+    /// Cells that a design takes for each of its flip-flops, beside those of its tables, where a cell holds a table and a flip-flop: of
+    /// placed designs. `None` where flip-flops have places of their own.
+    pub cells_per_flip_flop: Option<f64>,
     /// Bits of the operands of a multiplier block.
     pub multiplier: [u32; 2],
     /// Carry chain; `None` if it is part of the cells that count as look-up tables.
@@ -110,6 +113,10 @@ pub struct Oscillator {
     pub cell: &'static str,
     /// Lowest and highest nominal frequency, MHz.
     pub mhz: (f64, f64),
+    /// Nominal frequency of [`Oscillator::instance`], MHz.
+    pub runs: f64,
+    /// Instance in Verilog that drives `oscillation` at some 10 MHz, or at the cell's only frequency.
+    pub instance: &'static str,
 }
 
 impl PartialEq for Family {
@@ -157,6 +164,11 @@ impl Family {
     pub fn representative(&self) -> Option<&'static Part> {
         let measured = self.place.as_ref().and_then(|place| self.part(place.measured.part));
         measured.or_else(|| self.parts.last())
+    }
+
+    /// The cells that limit a design, in words.
+    pub fn cells_text(&self) -> &'static str {
+        if self.cells_per_flip_flop.is_some() { "cells" } else { self.lut }
     }
 
     /// Block RAM.

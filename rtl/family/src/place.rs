@@ -47,8 +47,11 @@ pub struct MeasurementDevice {
     pub pins: File,
     /// Further arguments of place and route.
     pub options: &'static [&'static str],
-    /// Units that were counted but not placed alone: name, LUTs, multipliers.
-    pub units: &'static [(&'static str, u64, u64)],
+    /// Units that were counted but not placed alone: name; LUTs, flip-flops and multipliers.
+    pub units: &'static [(&'static str, [u64; 3])],
+    /// LUTs, and flip-flops, of an output port, a counted loop, an entry of the return stack, and a bit of the address of a memory or a bank:
+    /// differences between machines that were synthesised with more and fewer of them.
+    pub parts: [[f64; 4]; 2],
 }
 
 /// Packing of a placed design into a bitstream.

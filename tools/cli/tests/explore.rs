@@ -65,6 +65,30 @@ fn a_budget_is_kept() {
     }
 }
 
+/// For a small device, rows have just what the program uses, fit beside a board's logic, and take no more cycles than the machine that they
+/// come from.
+#[test]
+fn a_device_gets_machines_that_fit_it() {
+    let folder = workshop();
+    let line = "explore sums.s --device up5k --from t1 --candidates 30 --json";
+    let text = folder.line(line).ok();
+    let result: Value = serde_json::from_str(&text).unwrap();
+    let front = result["front"].as_array().unwrap();
+    assert!(!front.is_empty(), "{text}");
+    folder.line("asm sums.s -m t1 -o sums.elf --effort 1").ok();
+    let ran: Value = serde_json::from_str(&folder.line("run sums.elf --periods 4 --json").ok()).unwrap();
+    let most = ran["cycles"]["max"].as_u64().unwrap();
+    assert!(front.iter().any(|one| one["candidate"]["cycles"][0].as_u64().unwrap() <= most), "{text}");
+    for one in front {
+        let of = |key: &str| one["candidate"][key].as_f64().unwrap();
+        // The iCE40UP5K has 5,280 cells, 30 block RAMs and 8 multipliers.
+        assert!(of("luts") <= 4680.0 && of("block_rams") <= 30.0 && of("multipliers") <= 8.0, "{one}");
+        let row = one["row"].as_str().unwrap();
+        assert!(row.contains("\nloop_depth = 0\n") && row.contains("\noutputs_per_bank = 2\n"), "{row}");
+        assert!(!row.contains("sine") && !row.contains("recurrence"), "{row}");
+    }
+}
+
 /// Workers of a HyperQueue server find the same front as this process. HyperQueue is in the Python environment that `cargo xtask test`
 /// creates (`TAKT_VENV`, or `.venv`).
 #[test]
@@ -100,6 +124,9 @@ fn mistakes() {
         "explore wrong.s",
         "explore none.s",
         "explore sums.s --budget lut=3",
+        "explore sums.s --device up6k",
+        "explore sums.s --device 45f",
+        "explore sums.s --device up5k --from t4 --candidates 3",
         "explore sums.s --budget luts=3 --candidates 3",
         "explore sums.s --deadline 1 --candidates 3",
         "explore sums.s --from t9",

@@ -16,7 +16,8 @@ mod template;
 mod wrapper;
 
 pub(crate) use board::constraints;
-pub use board::{RESET, TOP};
+pub(crate) use board::simulated_oscillator;
+pub use board::{OSCILLATOR, RESET, TOP};
 pub use design::circuit_number;
 pub use error::TopError;
 pub use image::{Contents, RECORDS, image};
@@ -88,6 +89,9 @@ pub fn circuit<'a>(
     }
     put(&format!("{AROUND}.v"), around);
     put(&format!("{TOP}.v"), board::top(board, wiring)?);
+    if let Some(text) = board::oscillator(board, wiring) {
+        put(OSCILLATOR, text);
+    }
     put("image.hex", contents.file(application.description().cores.len()));
     Ok(Circuit {
         files,
@@ -122,7 +126,7 @@ fn contents(wiring: &Wiring, application: &Application<'_>) -> Result<Contents, 
     Ok(contents)
 }
 
-/// The files of the host's UART, carriers, filters and trips that a wiring does not need.
+/// The files of the host's UART, carriers, filters, trips and watchdogs that a wiring does not need.
 fn unused(wiring: &Wiring) -> Vec<&'static str> {
     let has = |strobe: fn(&Strobes) -> bool| {
         wiring.peripherals.iter().any(|peripheral| strobe(&peripheral.kind.strobes))
@@ -138,6 +142,8 @@ fn unused(wiring: &Wiring) -> Vec<&'static str> {
         ("takt_uart_send.v", wiring.uart),
         ("takt_scope.v", wiring.scope.is_some()),
         ("takt_trip.v", has(|strobes| strobes.trips)),
+        ("takt_watchdog.v", wiring.signal("watchdog").is_some()),
+        ("takt_clock_watch.v", wiring.clock_watch),
     ];
     needed.into_iter().filter(|(_, is_needed)| !is_needed).map(|(name, _)| name).collect()
 }

@@ -20,6 +20,8 @@ pub(crate) struct OwnPin {
     pub(crate) pin: String,
     /// See [`Pin::is_register`](crate::kind::Pin::is_register).
     pub(crate) is_register: bool,
+    /// Level that switches off what is at the pin; `None` for pins that do not depend on `drive`.
+    pub(crate) off: Option<bool>,
 }
 
 /// The pins of signals and peripherals.
@@ -27,13 +29,17 @@ pub(crate) fn own_pins(wiring: &Wiring) -> Vec<OwnPin> {
     let mut pins = Vec::new();
     for (signal, pin) in SIGNALS.iter().zip(&wiring.signals) {
         let (name, direction) = (format!("signal_{}", signal.name), signal.direction);
-        pins.extend(pin.clone().map(|pin| OwnPin { name, direction, pin, is_register: false }));
+        let off = (signal.name == "drive").then_some(false);
+        pins.extend(pin.clone().map(|pin| OwnPin { name, direction, pin, is_register: false, off }));
     }
     for peripheral in &wiring.peripherals {
         for (pin, at) in peripheral.kind.pins.iter().zip(&peripheral.pins) {
             let (name, direction) = (format!("{}_{}", peripheral.name, pin.name), pin.direction);
-            let is_register = pin.is_register;
-            pins.extend(at.clone().map(|pin| OwnPin { name, direction, pin, is_register }));
+            let level = || pin.off.is_some_and(|parameter| peripheral.parameter(parameter) != 0);
+            let off = (peripheral.kind.strobes.enable && direction == Direction::Output).then(level);
+            // A pin that goes off without a clock has logic behind its register.
+            let is_register = pin.is_register && !(wiring.clock_watch && off.is_some());
+            pins.extend(at.clone().map(|pin| OwnPin { name, direction, pin, is_register, off }));
         }
     }
     pins

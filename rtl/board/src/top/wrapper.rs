@@ -10,7 +10,7 @@ use super::template::{Values, fill};
 use super::{links, ports};
 use crate::application::Application;
 use crate::protocol::{self, CORE, core_bits};
-use crate::wiring::{SIGNALS, Wiring};
+use crate::wiring::Wiring;
 use std::fmt::Write as _;
 use takt_isa::Machine;
 use takt_rtl::Library;
@@ -79,11 +79,14 @@ fn pins(wiring: &Wiring) -> Values {
     for (name, value) in
         [("drive", "drive"), ("fault", "|fault"), ("deadline", "|{@ALL_MISSES@}"), ("tick", "ticks")]
     {
-        if SIGNALS.iter().zip(&wiring.signals).any(|(signal, pin)| signal.name == name && pin.is_some()) {
+        if wiring.signal(name).is_some() {
             let _ = writeln!(signals, "    assign signal_{name} = {value};");
         }
     }
-    let stop = match wiring.signals[3] {
+    if wiring.signal("watchdog").is_some() {
+        signals += "    takt_watchdog #(.CORES(@CORES@)) watchdog (.clk(clk), .rst(rst), .drive(drive), .done(puts), .pin(signal_watchdog));\n";
+    }
+    let stop = match wiring.signal("stop") {
         Some(_) => {
             "    takt_filter #(.HOLD(16), .BITS(8)) filter_stop (.clk(clk), .rst(rst), .pin(signal_stop), .level(stop));"
         }

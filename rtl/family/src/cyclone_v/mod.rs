@@ -37,10 +37,16 @@ pub static FAMILY: Family = Family {
         logic: Some(Shape { words: 32, bits: 20 }),
     },
     lut: "ALUT",
+    cells_per_flip_flop: None,
     multiplier: [27, 27],
     carry: None,
     initial_registers: true,
-    oscillator: Some(Oscillator { cell: "cyclonev_oscillator", mhz: (100.0, 100.0) }),
+    oscillator: Some(Oscillator {
+        cell: "cyclonev_oscillator",
+        mhz: (100.0, 100.0),
+        runs: 100.0,
+        instance: "cyclonev_oscillator oscillator (.oscena(1'b1), .clkout(oscillation));",
+    }),
     cells: Cells {
         luts: &[("MISTRAL_ALUT", 1), ("MISTRAL_NOT", 1), ("MISTRAL_MLAB", 2)],
         carries: &[],

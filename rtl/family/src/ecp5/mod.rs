@@ -30,10 +30,16 @@ pub static FAMILY: Family = Family {
     ],
     memories: Memories { block: KBIT_18, logic: Some(Shape { words: 16, bits: 4 }) },
     lut: "LUT4",
+    cells_per_flip_flop: None,
     multiplier: [18, 18],
     carry: Some(Carry { cell: "CCU2C", luts: 2, ports: &["FCI", "FCO"] }),
     initial_registers: true,
-    oscillator: Some(Oscillator { cell: "OSCG", mhz: (2.4, 155.0) }),
+    oscillator: Some(Oscillator {
+        cell: "OSCG",
+        mhz: (2.4, 155.0),
+        runs: 310.0 / 32.0,
+        instance: "OSCG #(.DIV(32)) oscillator (.OSC(oscillation));",
+    }),
     cells: Cells {
         // The 16 x 4 bits of a memory in logic take four LUT4.
         luts: &[("LUT4", 1), ("CCU2C", 2), ("TRELLIS_DPR16X4", 4)],
@@ -111,8 +117,10 @@ LOCATE COMP \"serial_out\" SITE \"U1\";
 ",
     ),
     options: &["--lpf-allow-unconstrained"],
-    // As yosys' `synth_ecp5` counts them (`add`, counted the same way, has 810 LUT4 and, placed, 814).
-    units: &[("fused", 1635, 3), ("addmul", 945, 3), ("recurrence", 657, 0)],
+    // As `cargo evidence synth --unit addmul --count` and so on count them (t1, counted the same way, has 5,570 LUT4 and, placed, 5,741).
+    units: &[("fused", [1453, 452, 3]), ("addmul", [888, 515, 3]), ("recurrence", [598, 395, 0])],
+    // t1 with 32 and 2 output ports, 4 and 0 loops, 16 and 2 entries, and memories and banks of 38 and 25 address bits in all.
+    parts: [[3.5, 132.0, 3.4, 12.7], [0.1, 59.0, 0.6, 6.7]],
 };
 
 /// File for yosys: the delays of multipliers and block RAMs, which its logic mapping does not know by itself.

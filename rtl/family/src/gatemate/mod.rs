@@ -32,6 +32,7 @@ pub static FAMILY: Family = Family {
         logic: None,
     },
     lut: "LUT4",
+    cells_per_flip_flop: None,
     multiplier: [18, 18],
     carry: None,
     initial_registers: true,
@@ -95,6 +96,7 @@ NET \"serial_out\" Loc = \"IO_NB_A1\";
     ),
     options: &[],
     units: &[],
+    parts: [[0.0; 4]; 2],
 };
 
 /// Names of pins: `IO_NB_A1`, bank NB, row A, number 1.

@@ -11,7 +11,12 @@ pub static FAMILY: Family = Family {
     parts: &[Part { name: "GW5A-25", tool: "GW5A-LV25", room: room(23_040, 23_040, 28, 56) }],
     grades: (1, 2),
     multiplier: [27, 18],
-    oscillator: Some(Oscillator { cell: "OSCA", mhz: (1.7, 105.0) }),
+    oscillator: Some(Oscillator {
+        cell: "OSCA",
+        mhz: (1.7, 105.0),
+        runs: 210.0 / 22.0,
+        instance: "OSCA #(.FREQ_DIV(22)) oscillator (.OSCOUT(oscillation), .OSCEN(1'b1));",
+    }),
     cells: Cells { multipliers: &[("MULTALU27X18", 1), ("MULT27X36", 2)], ..CELLS },
     pll: Some(Pll { instance: pll::arora_v, stand_in: ("PLLA.v", include_str!("PLLA.v")) }),
     synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw5a", top, netlist), files: FILES }),
@@ -48,4 +53,5 @@ IO_LOC \"serial_out\" G11;
     ),
     options: &[],
     units: &[],
+    parts: [[0.0; 4]; 2],
 };

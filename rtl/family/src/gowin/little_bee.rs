@@ -2,7 +2,7 @@
 //! Gowin GW1N, the family for small designs, called LittleBee.
 
 use super::{FILES, GW2A, PACK, PINOUT, PLACE, commands, device, packed, pll};
-use crate::{Family, MeasurementDevice, Pack, Part, Pinout, Place, Pll, Synthesis, room};
+use crate::{Family, MeasurementDevice, Oscillator, Pack, Part, Pinout, Place, Pll, Synthesis, room};
 
 /// Gowin GW1NR-9, a GW1N-9 with a memory beside it: data sheet DS117, clocks UG286.
 pub static FAMILY: Family = Family {
@@ -10,6 +10,12 @@ pub static FAMILY: Family = Family {
     text: "Gowin GW1N",
     parts: &[Part { name: "GW1NR-9", tool: "GW1NR-LV9", room: room(8_640, 6_480, 20, 26) }],
     grades: (5, 6),
+    oscillator: Some(Oscillator {
+        cell: "OSC",
+        mhz: (2.0, 125.0),
+        runs: 250.0 / 26.0,
+        instance: "OSC #(.FREQ_DIV(26), .DEVICE(\"GW1NR-9\")) oscillator (.OSCOUT(oscillation));",
+    }),
     pll: Some(Pll { instance: pll::gw1n, stand_in: ("rPLL.v", include_str!("rPLL.v")) }),
     synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw1n", top, netlist), files: FILES }),
     place: Some(Place {
@@ -43,4 +49,5 @@ IO_LOC \"serial_out\" 17;
     ),
     options: &[],
     units: &[],
+    parts: [[0.0; 4]; 2],
 };

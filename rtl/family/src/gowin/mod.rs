@@ -30,10 +30,16 @@ const GW2A: Family = Family {
     modules: &[],
     memories: Memories { block: KBIT_18, logic: Some(Shape { words: 16, bits: 4 }) },
     lut: "LUT4",
+    cells_per_flip_flop: None,
     multiplier: [18, 18],
     carry: Some(Carry { cell: "ALU", luts: 1, ports: &["CIN", "COUT"] }),
     initial_registers: true,
-    oscillator: Some(Oscillator { cell: "OSC", mhz: (2.0, 125.0) }),
+    oscillator: Some(Oscillator {
+        cell: "OSC",
+        mhz: (2.0, 125.0),
+        runs: 250.0 / 26.0,
+        instance: "OSC #(.FREQ_DIV(26), .DEVICE(\"GW2A-18\")) oscillator (.OSCOUT(oscillation));",
+    }),
     cells: CELLS,
     pll: Some(Pll { instance: pll::gw2a, stand_in: ("rPLL.v", include_str!("rPLL.v")) }),
     synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw2a", top, netlist), files: FILES }),
@@ -160,4 +166,5 @@ IO_LOC \"serial_out\" C13;
     ),
     options: &[],
     units: &[],
+    parts: [[0.0; 4]; 2],
 };

@@ -33,10 +33,17 @@ pub static FAMILY: Family = Family {
         logic: None,
     },
     lut: "LUT4",
+    // The board `step` on an iCEBreaker: 5,139 cells, 3,572 tables, 2,428 flip-flops.
+    cells_per_flip_flop: Some(0.65),
     multiplier: [16, 16],
     carry: None,
     initial_registers: true,
-    oscillator: Some(Oscillator { cell: "SB_HFOSC", mhz: (6.0, 48.0) }),
+    oscillator: Some(Oscillator {
+        cell: "SB_HFOSC",
+        mhz: (6.0, 48.0),
+        runs: 12.0,
+        instance: "SB_HFOSC #(.CLKHF_DIV(\"0b10\")) oscillator (.CLKHFPU(1'b1), .CLKHFEN(1'b1), .CLKHF(oscillation));",
+    }),
     cells: Cells {
         luts: &[("SB_LUT4", 1)],
         carries: &[],
@@ -122,6 +129,7 @@ set_io serial_out 9
     ),
     options: &["--pcf-allow-unconstrained"],
     units: &[],
+    parts: [[0.0; 4]; 2],
 };
 
 /// Physical constraints (PCF). There is no resistor to ground, and the clock's frequency is an option of place and route.

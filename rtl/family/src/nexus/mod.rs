@@ -17,10 +17,16 @@ pub static FAMILY: Family = Family {
     modules: &[],
     memories: Memories { block: KBIT_18, logic: Some(Shape { words: 16, bits: 4 }) },
     lut: "LUT4",
+    cells_per_flip_flop: None,
     multiplier: [18, 18],
     carry: None,
     initial_registers: true,
-    oscillator: Some(Oscillator { cell: "OSCA", mhz: (1.8, 450.0) }),
+    oscillator: Some(Oscillator {
+        cell: "OSCA",
+        mhz: (1.8, 450.0),
+        runs: 10.0,
+        instance: "OSCA #(.HF_CLK_DIV(\"44\"), .HF_OSC_EN(\"ENABLED\")) oscillator (.HFOUTEN(1'b1), .HFSDSCEN(1'b0), .HFCLKOUT(oscillation));",
+    }),
     cells: Cells {
         luts: &[("LUT4", 1), ("DPR16X4", 4)],
         carries: &[],
@@ -83,6 +89,7 @@ ldc_set_location -site {F18} [get_ports serial_out]
     ),
     options: &[],
     units: &[],
+    parts: [[0.0; 4]; 2],
 };
 
 /// Physical design constraints (PDC). The clock's frequency is an option of place and route.

@@ -25,11 +25,15 @@ pub static FAMILY: Family = Family {
     modules: &[],
     memories: Memories { block: KBIT_18, logic: Some(Shape { words: 32, bits: 6 }) },
     lut: "LUT6",
+    cells_per_flip_flop: None,
     multiplier: [25, 18],
     carry: None,
     initial_registers: true,
     // CFGMCLK of STARTUPE2: 65 MHz, within 50 %.
-    oscillator: Some(Oscillator { cell: "STARTUPE2", mhz: (65.0, 65.0) }),
+    oscillator: Some(Oscillator { cell: "STARTUPE2", mhz: (65.0, 65.0), runs: 65.0, instance: "STARTUPE2 oscillator (
+        .CFGMCLK(oscillation), .CLK(1'b0), .GSR(1'b0), .GTS(1'b0), .KEYCLEARB(1'b1), .PACK(1'b0), .USRCCLKO(1'b0), .USRCCLKTS(1'b1),
+        .USRDONEO(1'b1), .USRDONETS(1'b1)
+    );" }),
     cells: Cells {
         luts: &[
             ("LUT", 1),

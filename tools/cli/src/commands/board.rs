@@ -324,14 +324,13 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
     }
 }
 
-/// Estimated cells of the cores beside those of the device, without the board's own circuit. The estimates are of the measured family.
+/// Estimated cells of the cores beside those of the device, without the board's own circuit, for families with measurements.
 fn cells_text(board: &Board, carried: &application::Application) -> Result<String> {
     const THEN: &str = "`takt board build` counts all cells";
-    let Some(room) = board.device.room.as_ref().filter(|_| board.family.name == takt_family::REFERENCE.name)
-    else {
+    let Some(room) = board.device.room.as_ref().filter(|_| Estimator::knows(board.family)) else {
         return Ok(format!("cells: not estimated for the {}; {THEN}", board.family.text));
     };
-    let estimator = Estimator::new()?;
+    let estimator = Estimator::of(board.family)?;
     let cores = carried.programs().iter().map(|loaded| estimator.estimate(loaded.program.machine));
     let cores = cores.collect::<Result<Vec<_>, _>>()?;
     let luts: f64 = cores.iter().map(|core| core.luts).sum();
@@ -342,7 +341,7 @@ fn cells_text(board: &Board, carried: &application::Application) -> Result<Strin
         "{cores} about {:.0} of {} {}, {block_rams} of {} block RAMs, {multipliers} of {} multipliers of the {} (estimated); {THEN}",
         (luts / 100.0).round() * 100.0,
         room.luts,
-        board.family.lut,
+        board.family.cells_text(),
         room.block_rams,
         room.multipliers,
         board.device.name

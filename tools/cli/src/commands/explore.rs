@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The command `takt explore`: searches for machines on which given programs run fast and whose circuits are small.
 
+mod device;
 mod front;
 mod moves;
 mod picture;
@@ -21,7 +22,9 @@ use crate::terminal::page::{Columns, left, right};
 use crate::terminal::progress::DelayedProgress;
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use device::Device;
 use front::{Candidate, front};
+use moves::Depths;
 use rayon::prelude::*;
 use result_cache::{CachedCycles, ResultCache};
 use serde_json::json;
@@ -31,7 +34,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use takt_analysis::period::{PERIODS, run_to_period};
-use takt_family::MEASURED;
+use takt_family::{Family, MEASURED, REFERENCE, Resources};
 use takt_isa::{MACHINES, Machine, RowOwned};
 use takt_rtl::estimate::{Calibration, Estimate, Estimator};
 
@@ -42,6 +45,9 @@ use takt_rtl::estimate::{Calibration, Estimate, Estimator};
 /// multipliers are counted; LUT4 and clock are estimated from what was placed and routed, and the error of that is printed. The result is
 /// the Pareto front in time, LUT4 and block RAM. Results are kept: a search that was stopped (Ctrl-C prints what there is) goes on.
 /// With --route the fastest machines of the front are placed and routed, too.
+///
+/// With --device it looks for machines that fit one, with room for the board's own logic: it begins with rows that have just the units,
+/// loops, memories and registers that the programs use, and estimates LUT and clock for the device's family.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Explore {
@@ -51,7 +57,10 @@ pub(crate) struct Explore {
     /// A machine to begin with, by name or file; may be given several times [default: all of Takt's own].
     #[arg(long = "from", value_name = "MACHINE", value_parser = options::machine)]
     from: Vec<&'static Machine>,
-    /// The most that a machine may take, of each that is named: `luts=12010,ram=56,multipliers=12`.
+    /// The device that a machine is for, as `up5k`, `gw1nr-9` or `lfe5u-25f`.
+    #[arg(long, value_name = "PART", value_parser = device::device)]
+    device: Option<Device>,
+    /// The most that a machine may take, of each that is named: `luts=12010,flip-flops=7489,ram=56,multipliers=12`.
     #[arg(long, value_name = "BUDGET", default_value = "", hide_default_value = true, value_parser = budget)]
     budget: Budget,
     /// The longest time of each program's period: `1.2us`, or a number of cycles.
@@ -74,7 +83,8 @@ pub(crate) struct Explore {
     svg: Option<PathBuf>,
     #[command(flatten)]
     source: SourceArguments,
-    /// Place and route the N fastest machines of the front on an LFE5U-85F, minutes each (installs the tools, 400 MB, once).
+    /// Place and route the N fastest machines of the front on an LFE5U-85F, or on the family of --device, minutes each (installs the tools,
+    /// 400 MB, once).
     #[cfg(feature = "board")]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=100))]
     route: Option<u8>,
@@ -95,6 +105,7 @@ Examples:
   takt explore a.s b.s --budget luts=12010,ram=56 -o machines
                                                what fits, as files for -m
   takt explore a.s --from my.toml --candidates 1000 --svg front.svg
+  takt explore a.s --device up5k -o machines   what fits an iCE40UP5K with its board
   takt explore a.s --route 3 --seeds 5         place and route the three fastest
   takt explore a.s --hq-server ~/server        on the workers of a HyperQueue server";
 
@@ -107,6 +118,7 @@ const EXPANDED: usize = 200;
 #[derive(Clone, Copy, Default)]
 struct Budget {
     luts: Option<u64>,
+    flip_flops: Option<u64>,
     block_rams: Option<u64>,
     multipliers: Option<u64>,
 }
@@ -119,21 +131,37 @@ fn budget(text: &str) -> Result<Budget, String> {
         let value = number::natural(value).map_err(|error| format!("`{part}`: {error}"))?;
         match name {
             "luts" => budget.luts = Some(value),
+            "flip-flops" => budget.flip_flops = Some(value),
             "ram" => budget.block_rams = Some(value),
             "multipliers" => budget.multipliers = Some(value),
             _ => {
-                let near = options::suggest(name, ["luts", "ram", "multipliers"]);
-                return Err(format!("`{name}` is not a resource{near} (luts, ram, multipliers)"));
+                let near = options::suggest(name, RESOURCES);
+                return Err(format!("`{name}` is not a resource{near} ({})", RESOURCES.join(", ")));
             }
         }
     }
     Ok(budget)
 }
 
+/// Names of the resources in a budget.
+const RESOURCES: [&str; 4] = ["luts", "flip-flops", "ram", "multipliers"];
+
 impl Budget {
+    /// The lesser of each: this budget, and the resources of a device.
+    fn within(self, room: &Resources) -> Budget {
+        let least = |own: Option<u64>, room: u64| Some(own.map_or(room, |own| own.min(room)));
+        Budget {
+            luts: least(self.luts, room.luts),
+            flip_flops: least(self.flip_flops, room.flip_flops),
+            block_rams: least(self.block_rams, room.block_rams),
+            multipliers: least(self.multipliers, room.multipliers),
+        }
+    }
+
     fn holds(self, estimate: &Estimate) -> bool {
         let within = |most: Option<u64>, taken: f64| most.is_none_or(|most| taken <= most as f64);
         within(self.luts, estimate.luts)
+            && within(self.flip_flops, estimate.flip_flops)
             && within(self.block_rams, estimate.block_rams as f64)
             && within(self.multipliers, estimate.multipliers as f64)
     }
@@ -145,6 +173,7 @@ static STOPPED: AtomicBool = AtomicBool::new(false);
 /// State of a search.
 struct Search<'a> {
     arguments: &'a Explore,
+    budget: Budget,
     estimator: Estimator,
     /// Contents of the program files.
     programs: Vec<(&'a Path, Vec<u8>)>,
@@ -155,8 +184,8 @@ struct Search<'a> {
     bar: DelayedProgress,
     /// Number of rows evaluated.
     tried: u64,
-    /// Minima over the machines that run all programs: LUT4, block RAMs, multipliers, and cycles of the longest period.
-    least: Option<[u64; 4]>,
+    /// Minima over the machines that run all programs: LUT4, flip-flops, block RAMs, multipliers, and cycles of the longest period.
+    least: Option<[u64; 5]>,
     all: Vec<Candidate>,
 }
 
@@ -184,7 +213,8 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
     interrupt::on_interrupt(|| STOPPED.store(true, Ordering::Relaxed))?;
     let mut search = Search {
         arguments,
-        estimator: Estimator::new()?,
+        budget: arguments.device.map_or(arguments.budget, |device| arguments.budget.within(&device.room)),
+        estimator: Estimator::of(arguments.device.map_or(REFERENCE, |device| device.family))?,
         programs,
         kept: Mutex::new(ResultCache::open(&key)),
         key,
@@ -205,7 +235,13 @@ impl Search<'_> {
         for machine in start {
             self.estimator.estimate(machine).with_context(|| format!("no circuit of {}", machine.name))?;
         }
-        let begun = self.evaluate(start.to_vec())?;
+        let begun = match self.arguments.device {
+            None => self.evaluate(start.to_vec())?,
+            Some(_) => {
+                let least = start.iter().filter_map(|machine| self.least_row(machine)).collect();
+                self.evaluate(least)?
+            }
+        };
         if begun.is_empty() {
             return Err(self.misfit(start[0], color));
         }
@@ -217,16 +253,36 @@ impl Search<'_> {
             let Some(next) = next.map(|one| one.machine) else { break };
             expanded.insert(next.name);
             let fits = |machine: &&'static Machine| {
-                self.estimator.estimate(machine).is_ok_and(|estimate| self.arguments.budget.holds(&estimate))
+                self.estimator.estimate(machine).is_ok_and(|estimate| self.budget.holds(&estimate))
             };
-            let rows =
-                moves::neighbours(&RowOwned::from(next)).into_iter().filter_map(|row| row.machine().ok());
+            let row = RowOwned::from(next);
+            let depths = self.arguments.device.map_or(Depths::Most, |_| Depths::of(&row));
+            let rows = moves::neighbours(&row, depths).into_iter().filter_map(|row| row.machine().ok());
             let left = usize::try_from(self.arguments.candidates - self.tried).unwrap_or(usize::MAX);
             let new = rows.filter(|machine| seen.insert(machine.name)).filter(fits).take(left);
             let new: Vec<_> = new.collect();
             self.evaluate(new)?;
         }
         Ok(())
+    }
+
+    /// The machine without what the programs do not use: units, loops, words, registers and ports are left out, as long as the programs
+    /// take no more cycles. `None` if a program does not fit the machine.
+    fn least_row(&self, machine: &'static Machine) -> Option<&'static Machine> {
+        let cycles = |machine| Some(self.candidate(machine)?.cycles.iter().sum::<u64>());
+        let most = cycles(machine)?;
+        let mut least = machine;
+        // A row that could not spare something with more of the rest cannot spare it with less, either.
+        let mut kept = 0;
+        loop {
+            let rows = moves::smaller(&RowOwned::from(least));
+            let Some((row, depths)) = rows.get(kept) else { return Some(least) };
+            let smaller = moves::finished(row, *depths).and_then(|row| row.machine().ok());
+            match smaller.filter(|machine| cycles(machine).is_some_and(|cycles| cycles <= most)) {
+                Some(smaller) => least = smaller,
+                None => kept += 1,
+            }
+        }
     }
 
     /// Evaluates machines in parallel. Those within budget and deadline become candidates; returns all that run the programs.
@@ -240,13 +296,14 @@ impl Search<'_> {
         let good: Vec<Candidate> = tried.into_iter().flatten().collect();
         for Candidate { cycles, estimate, .. } in &good {
             let longest = cycles.iter().copied().max().unwrap_or(0);
-            let own = [estimate.luts as u64, estimate.block_rams, estimate.multipliers, longest];
+            let Estimate { luts, flip_flops, block_rams, multipliers, .. } = estimate;
+            let own = [*luts as u64, *flip_flops as u64, *block_rams, *multipliers, longest];
             let least = self.least.get_or_insert(own);
             least.iter_mut().zip(own).for_each(|(least, own)| *least = own.min(*least));
         }
         let is_within = |one: &&Candidate| {
             let deadline = self.arguments.deadline.map(|time| time.cycles(one.estimate.mhz));
-            self.arguments.budget.holds(&one.estimate)
+            self.budget.holds(&one.estimate)
                 && deadline.is_none_or(|deadline| one.cycles.iter().all(|cycles| *cycles <= deadline))
         };
         let within: Vec<Candidate> = good.iter().filter(is_within).cloned().collect();
@@ -324,7 +381,7 @@ impl Search<'_> {
         let routed = match self.arguments.route.filter(|_| !is_stopped()) {
             Some(count) => {
                 let best = &front[..front.len().min(count.into())];
-                route::route(best, self.arguments.seeds, &self.workers, &STOPPED)?
+                route::route(best, (self.family(), self.arguments.seeds), &self.workers, &STOPPED)?
             }
             None => Vec::new(),
         };
@@ -346,27 +403,46 @@ impl Search<'_> {
             message("stopped; the same command goes on from here\n");
         }
         if front.is_empty() {
-            let [luts, ram, multipliers, cycles] = self.least.unwrap_or_default();
+            let [luts, flip_flops, ram, multipliers, cycles] = self.least.unwrap_or_default();
+            let device = self.arguments.device.map_or_else(String::new, |device| format!(" ({device})"));
             bail!(
-                "none of {} rows keeps budget and deadline: allow more, or try more (--candidates). The least among them, each by \
-                 itself: {luts} LUT4, {ram} block RAMs, {multipliers} multipliers, {cycles} cycles for the longest period",
-                self.tried
+                "none of {} rows keeps budget{device} and deadline: allow more, or try more (--candidates). The least among them, each \
+                 by itself: {luts} {}, {flip_flops} flip-flops, {ram} block RAMs, {multipliers} multipliers, {cycles} cycles for the \
+                 longest period",
+                self.tried,
+                self.tables()
             );
         }
         self.table(&front, out)?;
         errors(&calibration, out)?;
+        if self.family() != REFERENCE {
+            out.paragraph(&format!(
+                "Figures for {} are converted from these, by the machines that were synthesised for both families; a machine that fits by \
+                 little, or misses by little, is to be placed: `--route 1`.\n",
+                self.family().text
+            ))?;
+        }
         #[cfg(feature = "board")]
         if !routed.is_empty() {
-            return route::table(&routed, out);
+            return route::table(&routed, self.family(), out);
         }
         let folder = self.arguments.output.as_deref().unwrap_or(Path::new("DIR"));
         let file = folder.join(format!("{}.toml", front[0].machine.identifier()));
         let write = if self.arguments.output.is_none() { "`-o DIR` writes the rows as files; " } else { "" };
         out.paragraph(&format!(
-            "{write}`--route 3` places and routes the fastest; one alone, in Takt's repository: `cargo evidence synth --machine {} --seeds 3`",
+            "{write}`--route 3` places and routes the fastest; one alone, in Takt's repository: `cargo evidence synth --machine {} --seeds 3`\n",
             file.display()
         ))?;
         Ok(())
+    }
+
+    /// Cells that hold tables, in words.
+    fn tables(&self) -> &'static str {
+        self.family().cells_text()
+    }
+
+    fn family(&self) -> &'static Family {
+        self.arguments.device.map_or(REFERENCE, |device| device.family)
     }
 
     fn names(&self) -> Vec<String> {
@@ -383,6 +459,7 @@ impl Search<'_> {
             right(widest, 0),
             right(7, 1),
             right(8, 0),
+            right(7, 2),
             right(6, 0),
             right(7, 2),
             left(2, 3),
@@ -396,16 +473,20 @@ impl Search<'_> {
             self.tried,
             self.names().join(" + ")
         )?;
-        let head = ["machine", "time µs", "cycles", "MHz", "LUT4", "RAM", "mult.", "", "slots"];
+        if let Some(device) = self.arguments.device {
+            out.paragraph(&format!("{device}\n"))?;
+        }
+        let head = ["machine", "time µs", "cycles", "MHz", self.tables(), "FF", "RAM", "mult.", "", "slots"];
         out.lines(&columns.row(&head, None))?;
         for one in front {
-            let Estimate { luts, block_rams, multipliers, mhz } = one.estimate;
+            let Estimate { luts, flip_flops, block_rams, multipliers, mhz } = one.estimate;
             let cells = [
                 one.machine.name.to_owned(),
                 format!("{:.2}", one.time),
                 cycles(one),
                 format!("{mhz:.0}"),
                 format!("{luts:.0}"),
+                format!("{flip_flops:.0}"),
                 block_rams.to_string(),
                 multipliers.to_string(),
                 String::new(),
@@ -425,13 +506,13 @@ impl Search<'_> {
             // Quote the name, which may contain commas.
             text += &format!(",\"cycles of {}\"", name.replace('"', "\"\""));
         }
-        text += ",mhz,luts,block_rams,multipliers,slots\n";
+        text += ",mhz,luts,flip_flops,block_rams,multipliers,slots\n";
         for one in front {
-            let Estimate { luts, block_rams, multipliers, mhz } = one.estimate;
+            let Estimate { luts, flip_flops, block_rams, multipliers, mhz } = one.estimate;
             text += &format!("{},{:.4}", one.machine.name, one.time);
             one.cycles.iter().for_each(|cycles| text += &format!(",{cycles}"));
             text += &format!(
-                ",{mhz:.1},{luts:.0},{block_rams},{multipliers},{}\n",
+                ",{mhz:.1},{luts:.0},{flip_flops:.0},{block_rams},{multipliers},{}\n",
                 moves::summary_of(one.machine)
             );
         }

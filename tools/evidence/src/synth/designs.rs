@@ -5,6 +5,7 @@ use super::{Arguments, Design, system};
 use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::path::Path;
 use takt_automation::command::root;
 use takt_board::place;
 use takt_family::{Family, Mapping, Resources};
@@ -27,7 +28,9 @@ pub(super) fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     }
     if arguments.unit.is_empty() {
         let machine = takt_asm::machine(&arguments.machine).map_err(anyhow::Error::msg)?;
-        return Ok(vec![core(machine, &library, family)?]);
+        let file = Path::new(&arguments.machine);
+        let own = if file.is_file() { system::own_path(file)? } else { None };
+        return Ok(vec![core(machine, own, &library, family)?]);
     }
     let all = |unit: &&Unit| library.text(&format!("{}.v", unit.name)).is_some();
     let offered: Vec<&Unit> = UNITS.iter().filter(all).collect();
@@ -44,19 +47,24 @@ pub(super) fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     Ok(designs)
 }
 
-/// Core of a machine.
-fn core(machine: &'static Machine, library: &Library, family: &Family) -> Result<Design> {
+/// Core of a machine, which may be a file of this repository.
+fn core(
+    machine: &'static Machine,
+    own: Option<String>,
+    library: &Library,
+    family: &Family,
+) -> Result<Design> {
     let place::Core { files, top } = place::core(machine, library, family)?;
     Ok(Design {
-        name: machine.name.to_owned(),
+        // Record only machines of the table or of this repository, with their original memory sizes; others belong to their authors.
+        recorded: machine == machine.row() && (machine.is_builtin() || own.is_some()),
+        name: own.unwrap_or_else(|| machine.name.to_owned()),
         files,
         top,
         mapping: Mapping::of(machine),
         has_pins: true,
         wrapper: wishbone::PINS,
         parts: Vec::new(),
-        // Record only built-in machines with their original memory sizes; a machine from a file belongs to its author.
-        recorded: machine == machine.row() && machine.is_builtin(),
     })
 }
 

@@ -32,7 +32,7 @@ const SEEDS: u32 = 5;
 /// The designs to measure, and the options of the tools.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// The machine, with its memories.
+    /// The machine, with its memories; recorded if it is a row of the table or a file of this repository.
     #[arg(long, default_value = "t3", conflicts_with = "unit")]
     machine: String,
     /// A system of several cores instead, with its programs; recorded if it is one of this repository's.
@@ -177,7 +177,7 @@ pub(crate) fn recorded() -> Result<Vec<Synthesis>> {
     synthesis::parse(&text).with_context(|| format!("cannot read {RECORD}"))
 }
 
-/// Sort key of the rows: machines, then units, each in table order, then systems.
+/// Sort key of the rows: machines, then units, each in table order, then files.
 fn order(design: &str) -> usize {
     let machine = MACHINES.iter().position(|machine| machine.name == design);
     machine

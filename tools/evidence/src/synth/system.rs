@@ -101,9 +101,8 @@ endmodule
     };
     let parts = parts(&design.plan);
     // Name a system of this repository by its path.
-    let own = fs::canonicalize(file)?.strip_prefix(fs::canonicalize(root())?).map(Path::to_path_buf).ok();
-    let (recorded, name) =
-        own.map_or((false, name.into_owned()), |path| (true, path.to_string_lossy().replace('\\', "/")));
+    let own = own_path(file)?;
+    let (recorded, name) = (own.is_some(), own.unwrap_or_else(|| name.into_owned()));
     Ok(Design {
         name,
         files,
@@ -114,6 +113,12 @@ endmodule
         parts,
         recorded,
     })
+}
+
+/// Path in this repository of one of its files; `None` for other files.
+pub(super) fn own_path(file: &Path) -> Result<Option<String>> {
+    let (file, root) = (fs::canonicalize(file)?, fs::canonicalize(root())?);
+    Ok(file.strip_prefix(root).ok().map(|path| path.to_string_lossy().replace('\\', "/")))
 }
 
 /// Instances in the top module with their parts: each core with its gate, each snapshot and FIFO, and all wires as one part.

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use takt_board::place::NETLIST;
 use takt_family::{FAMILIES, Family, MEASURED, Mapping, REFERENCE, Resources, lacks};
+use takt_isa::UNITS;
 use takt_isa::spec::machines::MACHINES;
 use takt_rtl::synthesis::{PartResources, Synthesis};
 
@@ -81,7 +82,7 @@ which take a LUT4's place each (older rows have the total only). Multipliers hav
         lut = REFERENCE.lut,
         kbit = REFERENCE.block_ram().bits() / 1024,
     );
-    let is_machine = |row: &&Synthesis| MACHINES.iter().any(|machine| machine.name == row.design);
+    let is_machine = |row: &&Synthesis| !is_unit(&row.design) && row.parts.is_empty();
     let (reference, others): (Vec<_>, Vec<_>) = rows.iter().partition(|row| is_of(row, REFERENCE));
     let (machines, rest): (Vec<_>, Vec<_>) = reference.into_iter().partition(is_machine);
     let (systems, units): (Vec<_>, Vec<_>) = rest.into_iter().partition(|row| !row.parts.is_empty());
@@ -168,6 +169,11 @@ fn commands(family: &Family) -> String {
         let _ = write!(text, "; for units and machines of one slot with `{}`, which is smaller", more.trim());
     }
     text + "."
+}
+
+/// The design is a unit alone; machines are rows of the table or files of this repository.
+fn is_unit(design: &str) -> bool {
+    UNITS.iter().any(|unit| unit.name == design)
 }
 
 fn is_of(row: &Synthesis, family: &Family) -> bool {

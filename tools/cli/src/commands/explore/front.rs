@@ -61,7 +61,11 @@ mod tests {
     #[test]
     fn front_has_exactly_the_undominated_candidates() {
         let of = |cycles, luts, block_rams| {
-            Candidate::new(&T3, vec![cycles], Estimate { luts, block_rams, multipliers: 0, mhz: 1.0 })
+            Candidate::new(
+                &T3,
+                vec![cycles],
+                Estimate { luts, flip_flops: 0.0, block_rams, multipliers: 0, mhz: 1.0 },
+            )
         };
         let all = [
             of(10, 5.0, 9),

@@ -56,11 +56,28 @@ fn put(slot: &mut SlotOwned, mut unit: UnitOwned) -> bool {
     is_new
 }
 
+/// Depths of the banks of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Depths {
+    /// The greatest that there is room for in the space of registers.
+    Most,
+    /// Registers of each slot's bank, and inputs.
+    Are(u16, u16),
+}
+
+impl Depths {
+    /// Those of a row.
+    pub(super) fn of(row: &RowOwned) -> Depths {
+        let registers = row.slots.iter().map(|slot| slot.bank.depth).max().unwrap_or(1);
+        Depths::Are(registers, row.inputs.depth)
+    }
+}
+
 /// All neighbours of a row, normalised by [`finished`].
-pub(super) fn neighbours(row: &RowOwned) -> Vec<RowOwned> {
+pub(super) fn neighbours(row: &RowOwned, depths: Depths) -> Vec<RowOwned> {
     let mut all = Vec::new();
     let count = row.slots.len();
-    let mut push = |slots: Vec<SlotOwned>| all.extend(finished(&RowOwned { slots, ..row.clone() }));
+    let mut push = |slots: Vec<SlotOwned>| all.extend(finished(&RowOwned { slots, ..row.clone() }, depths));
     for (s, slot) in row.slots.iter().enumerate() {
         for (u, unit) in slot.units.iter().enumerate() {
             let mut without = row.slots.clone();
@@ -121,17 +138,56 @@ pub(super) fn neighbours(row: &RowOwned) -> Vec<RowOwned> {
     all
 }
 
-/// Normalises a row: units in table order, names and banks determined by the number of slots, banks of maximum depth, and a name derived
+/// Rows with less than a row has, each in one place: a unit, counted loops, or half of a memory's words, registers or ports.
+pub(super) fn smaller(row: &RowOwned) -> Vec<(RowOwned, Depths)> {
+    let depths @ Depths::Are(registers, inputs) = Depths::of(row) else { return Vec::new() };
+    let mut all: Vec<(RowOwned, Depths)> = Vec::new();
+    for (s, slot) in row.slots.iter().enumerate() {
+        for u in 0..slot.units.len() {
+            let mut without = row.clone();
+            without.slots[s].units.remove(u);
+            all.push((without, depths));
+        }
+    }
+    if row.loop_depth > 0 {
+        let mut without = row.clone();
+        let units = without.slots.iter_mut().flat_map(|slot| &mut slot.units);
+        units.for_each(|unit| unit.functions.retain(|function| *function != Function::Loop));
+        all.push((without, depths));
+    }
+    let half = |of: fn(&mut RowOwned) -> &mut u32| {
+        let mut half = row.clone();
+        let depth = of(&mut half);
+        *depth /= 2;
+        (*depth > 0).then_some((half, depths))
+    };
+    all.extend(half(|row| &mut row.code_depth));
+    all.extend(half(|row| &mut row.data_depth));
+    all.extend(half(|row| &mut row.stack_depth));
+    if row.outputs_per_bank > 1 {
+        all.push((RowOwned { outputs_per_bank: row.outputs_per_bank / 2, ..row.clone() }, depths));
+    }
+    if registers > 1 {
+        all.push((row.clone(), Depths::Are(registers / 2, inputs)));
+    }
+    if inputs > 1 {
+        all.push((row.clone(), Depths::Are(registers, inputs / 2)));
+    }
+    all
+}
+
+/// Normalises a row: units in table order, names and banks determined by the number of slots, banks of the given depths, and a name derived
 /// from the contents. `None` if there are no slots, or more than names.
-pub(super) fn finished(row: &RowOwned) -> Option<RowOwned> {
+pub(super) fn finished(row: &RowOwned, depths: Depths) -> Option<RowOwned> {
     let mut slots: Vec<SlotOwned> = row.slots.iter().filter(|slot| !slot.units.is_empty()).cloned().collect();
     let order = |unit: &UnitOwned| takt_isa::UNITS.iter().position(|row| row.name == unit.name);
     // Banks start at multiples of the largest depth; the input bank comes last and ends the register space of 1,024.
-    let (depths, inputs) = match slots.len() {
-        1 => ([512; 7], 256),
-        2 | 3 => ([256; 7], 256),
-        4 => ([256, 256, 256, 128, 0, 0, 0], 128),
-        5..=7 => ([128; 7], 128),
+    let (depths, inputs) = match (slots.len(), depths) {
+        (1..=7, Depths::Are(registers, inputs)) => ([registers; 7], inputs),
+        (1, Depths::Most) => ([512; 7], 256),
+        (2 | 3, Depths::Most) => ([256; 7], 256),
+        (4, Depths::Most) => ([256, 256, 256, 128, 0, 0, 0], 128),
+        (5..=7, Depths::Most) => ([128; 7], 128),
         _ => return None,
     };
     let mut base = 0;
@@ -186,7 +242,7 @@ mod tests {
     #[test]
     fn neighbours_have_circuits() {
         for &machine in MACHINES {
-            let rows = neighbours(&RowOwned::from(machine));
+            let rows = neighbours(&RowOwned::from(machine), Depths::Most);
             let good: Vec<_> = rows
                 .iter()
                 .filter_map(|row| row.machine().ok())
@@ -196,7 +252,7 @@ mod tests {
             assert!(slots.len() >= 2, "{}: {slots:?}", machine.name);
             assert!(good.len() > 8, "{}: {} of {}", machine.name, good.len(), rows.len());
             for row in rows {
-                assert_eq!(finished(&row).as_ref(), Some(&row));
+                assert_eq!(finished(&row, Depths::Most).as_ref(), Some(&row));
             }
         }
     }

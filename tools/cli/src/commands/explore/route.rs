@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use takt_board::place::{self, PlacedCore};
 use takt_board::tools::Venv;
-use takt_family::REFERENCE;
+use takt_family::Family;
 use takt_work::{Failure, Unit};
 
 /// A placed and routed machine.
@@ -44,25 +44,32 @@ impl RoutedMachine {
 /// Places and routes candidates.
 pub(super) fn route(
     candidates: &[&Candidate],
-    seeds: u32,
+    (family, seeds): (&'static Family, u32),
     workers: &Workers,
     stop: &AtomicBool,
 ) -> Result<Vec<RoutedMachine>> {
     let tools = std::path::absolute(crate::commands::board::tools_folder()?)?;
-    Venv::with(&tools, &place::packages(REFERENCE)?)?;
+    Venv::with(&tools, &place::packages(family)?)?;
     let below = takt_cache::folder()?.join("route");
     let mut folders: Vec<PathBuf> = Vec::new();
     for one in candidates {
-        let key = place::key(one.machine, REFERENCE)
-            .with_context(|| format!("no circuit of {}", one.machine.name))?;
+        let key =
+            place::key(one.machine, family).with_context(|| format!("no circuit of {}", one.machine.name))?;
         folders.push(below.join(format!("{}-{key}", one.machine.identifier())));
     }
     let netlist = |(one, folder): (&&Candidate, &PathBuf)| {
-        let job = Job::Netlist { row: one.machine.to_toml(), folder: folder.clone(), tools: tools.clone() };
+        let row = one.machine.to_toml();
+        let job = Job::Netlist {
+            row,
+            family: family.name.to_owned(),
+            folder: folder.clone(),
+            tools: tools.clone(),
+        };
         job.unit(workers, one.machine.name.to_owned(), "", Some(folder.join("netlist.result")))
     };
     let seed = |(one, folder): (&&Candidate, &PathBuf), seed: u32| {
-        let job = Job::Seed { folder: folder.clone(), tools: tools.clone(), seed };
+        let job =
+            Job::Seed { family: family.name.to_owned(), folder: folder.clone(), tools: tools.clone(), seed };
         let result = folder.join(format!("seed-{seed}.result"));
         job.unit(workers, format!("{} seed {seed}", one.machine.name), "", Some(result))
     };
@@ -106,7 +113,7 @@ pub(super) fn route(
 }
 
 /// Table of the routed machines.
-pub(super) fn table(routed: &[RoutedMachine], out: &mut Out) -> Result<()> {
+pub(super) fn table(routed: &[RoutedMachine], family: &'static Family, out: &mut Out) -> Result<()> {
     let columns = [
         left(11, 0),
         right(8, 0),
@@ -118,8 +125,9 @@ pub(super) fn table(routed: &[RoutedMachine], out: &mut Out) -> Result<()> {
         right(22, 3),
     ];
     let columns = Columns::new(&columns, out.page());
-    writeln!(out, "\nplaced and routed ({}), at the median clock", place::device(REFERENCE)?)?;
-    let head = ["machine", "time µs", "MHz", "least to most", "LUT4", "RAM", "mult.", "estimated MHz, LUT4"];
+    writeln!(out, "\nplaced and routed ({}), at the median clock", place::device(family)?)?;
+    let head =
+        ["machine", "time µs", "MHz", "least to most", family.lut, "RAM", "mult.", "estimated MHz, LUTs"];
     out.lines(&columns.row(&head, None))?;
     for row in routed {
         let (Some(first), Some(median), Some(time)) = (row.seeds.first(), row.median(), row.time) else {

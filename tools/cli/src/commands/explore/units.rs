@@ -25,10 +25,10 @@ pub(super) enum Job {
     Cycles(Vec<String>),
     /// Netlist of a machine's core, written to a folder.
     #[cfg(feature = "board")]
-    Netlist { row: String, folder: PathBuf, tools: PathBuf },
+    Netlist { row: String, family: String, folder: PathBuf, tools: PathBuf },
     /// Place and route of the netlist in a folder, with one seed.
     #[cfg(feature = "board")]
-    Seed { folder: PathBuf, tools: PathBuf, seed: u32 },
+    Seed { family: String, folder: PathBuf, tools: PathBuf, seed: u32 },
 }
 
 /// Machine described by a row.
@@ -65,18 +65,24 @@ pub(super) fn run(job: Job, result: &Path, cycles: impl Fn(&'static Machine) -> 
             workers::write(result, &rows)
         }
         #[cfg(feature = "board")]
-        Job::Netlist { row, folder, tools } => {
+        Job::Netlist { row, family, folder, tools } => {
             let tools = takt_board::tools::Venv::at(&tools);
-            takt_board::place::prepare(&tools, &folder, machine(&row)?, takt_family::REFERENCE)?;
+            takt_board::place::prepare(&tools, &folder, machine(&row)?, named(&family)?)?;
             Ok(takt_work::write(result, &takt_cache::seal(Vec::new()))?)
         }
         #[cfg(feature = "board")]
-        Job::Seed { folder, tools, seed } => {
+        Job::Seed { family, folder, tools, seed } => {
             let tools = takt_board::tools::Venv::at(&tools);
-            let placed = takt_board::place::place(&tools, &folder, seed, takt_family::REFERENCE)?;
+            let placed = takt_board::place::place(&tools, &folder, seed, named(&family)?)?;
             workers::write(result, &placed)
         }
     }
+}
+
+/// Family of a job.
+#[cfg(feature = "board")]
+fn named(family: &str) -> Result<&'static takt_family::Family> {
+    takt_family::Family::from_name(family).ok_or_else(|| anyhow::anyhow!("there is no family `{family}`"))
 }
 
 /// Computes the cycles of rows in units; an error if a unit failed.
