@@ -142,6 +142,36 @@ fn loops_that_call_themselves_are_errors() {
     common::good(&text.replace(" .for m, 1, 8\n", "").replace(" .endfor\n", ""));
 }
 
+/// An index is an integer of 32 bits, also where an iteration is written out and its value is known: equal lines mean the same in the loop
+/// and in its rest.
+#[test]
+fn the_index_of_an_iteration_that_is_written_out_has_32_bits() {
+    type Function = fn(i32) -> i32;
+    let parts: [(&str, Function); 9] = [
+        ("(v << 24) >> 24", |v| (v << 24) >> 24),
+        ("(v*100000000) >> 3", |v| v.wrapping_mul(100_000_000) >> 3),
+        ("v*100000000", |v| v.wrapping_mul(100_000_000)),
+        ("(v << 26) < 0", |v| i32::from((v << 26) < 0)),
+        ("(v*100000000 & -256) == (v << 26)", |v| i32::from(v.wrapping_mul(100_000_000) & -256 == v << 26)),
+        ("min(v*100000000, 5) + max(v << 25, -7)", |v| {
+            v.wrapping_mul(100_000_000).min(5).wrapping_add((v << 25).max(-7))
+        }),
+        ("halved(v << 27)", |v| (v << 27) >> 1),
+        ("halved(halved(v*100000000))", |v| v.wrapping_mul(100_000_000) >> 2),
+        ("halved(twice(v << 26))", |v| (v << 27) >> 1),
+    ];
+    let macros =
+        ".macro halved d:int, a:int\n d = a >> 1\n.endm\n.macro twice d:int, a:int\n d = a << 1\n.endm\n";
+    for (text, function) in parts {
+        let expected = (1..=145).step_by(2).fold(0_i32, |sum, v| sum.wrapping_add(function(v)));
+        for unroll in ["", " unroll 1", " unroll 8"] {
+            let body =
+                format!(" k = 0\n .for v, 1, 145 step 2{unroll}\n k = k + ({text})\n .endfor\n y = k\n");
+            gives(&format!("{macros}{DECLARED}"), &body, "", expected);
+        }
+    }
+}
+
 /// Two loops with a label of the same name, and with declarations, however many of their iterations are written out.
 #[test]
 fn labels_of_a_body_are_local_to_an_iteration() {

@@ -636,6 +636,43 @@ int step(int n) { s.c8 += 50; s.c8 += 100; s.tab[n & 3] = (int16_t)n; return s.c
     );
 }
 
+/// Unsigned divisors from 2^31 on fit once or not.
+#[test]
+fn divides_by_unsigned_numbers_from_2_to_the_31_on() {
+    check(
+        "wide_divisors",
+        "unsigned step(unsigned a, int n) {\n\
+         unsigned b = a | 0x80000000u;\n\
+         return a / 0x80000000u + 3*(a / 0xffffffffu) + 5*(a / 0xc0000001u) + a % 0xfffffff0u + 7*(n / 0x90000000u)\n\
+         + 11*(b / 0x80000001u) + b % 0x80000001u;\n}\n",
+    );
+}
+
+/// The body of a loop changes what its counter is compared with, and an iteration that is written out has a counter beyond a narrow type.
+#[test]
+fn bounds_loops_by_every_iteration() {
+    let code = "static int t[8] = { 3, -4, 500, -600, 7, 8, 9, 10 };\n\
+                int step(int n, int m) {\n  int w = 0, k = 0;\n\
+                for (int i = 0; i < ((2 - w) & 7); i++) {\n\
+                for (int j = 0; j < 40; j++) { w ^= (n >> (j & 31)) + t[(w + j) & 7]; k += w & m; }\n    k++;\n  }\n  return k;\n}\n";
+    let text = check("ends_that_change", code).text;
+    assert!(text.contains(".loop_bound 7\n"), "{text}");
+    check(
+        "narrow_counters",
+        "int step(int n) { int c = 7; for (int v = 1; v <= 146; v += 2) c -= (((signed char)v / 4) ^ n) >> 19; return c & 255; }\n",
+    );
+}
+
+/// The body of a loop counts down what the step counts up: nothing bounds the loop.
+#[test]
+fn refuses_a_counter_that_the_body_changes() {
+    let code = "static int t[8];\nint step(int n) {\n  int w = 0;\n\
+                for (int i = 0; i < 9; i++) {\n\
+                for (int j = 0; j < 40; j++) w ^= (n >> (j & 31)) + t[(w + j) & 7];\n    if (w & 1) i--;\n  }\n  return w;\n}\n";
+    let text = refused("changed_counter", code);
+    assert!(text.contains("no bound is known"), "{text}");
+}
+
 /// A member that data index lies in data memory with its own name and type; the others are registers.
 #[test]
 fn only_members_that_data_index_lie_in_memory() {

@@ -114,7 +114,7 @@ impl Context {
             }
         }
         let id = ExprId { first: 0, count: nodes.len() as u32 };
-        let value = expr::evaluate(nodes, id, &mut Environment { context: self, at });
+        let value = expr::evaluate(nodes, id, &mut Environment { context: self, at, computes_words: false });
         let integer = value.and_then(|value| {
             let span = nodes.last().map_or(span, |node| node.span);
             value.integer().map_err(|fault| EvalError { span, fault })
@@ -181,15 +181,31 @@ impl Context {
                 _ => {}
             }
         }
-        let ast = Rc::clone(ast);
-        let value = expr::evaluate(&ast.nodes, expr, &mut Environment { context: self, at });
+        self.evaluated(at, expr, false)
+    }
+
+    /// The value of an expression in an equation: with 32 bits if the index of a loop decides it, in an iteration that is written out, so that
+    /// the line means the same in a loop at run time.
+    pub(crate) fn equation_value(&mut self, at: AstPlace, expr: ExprId) -> Result<Value, ErrorReported> {
+        let computes_words = self.names_known_index(at, expr);
+        self.evaluated(at, expr, computes_words)
+    }
+
+    fn evaluated(
+        &mut self,
+        at: AstPlace,
+        expr: ExprId,
+        computes_words: bool,
+    ) -> Result<Value, ErrorReported> {
+        let ast = Rc::clone(&self.asts[at.ast as usize]);
+        let value = expr::evaluate(&ast.nodes, expr, &mut Environment { context: self, at, computes_words });
         value.map_err(|error| self.fault(at.scope, error))
     }
 
     /// The value of an index, given as its nodes.
     pub(crate) fn index(&mut self, at: AstPlace, nodes: &[Node], span: Span) -> Result<i64, ErrorReported> {
         let id = ExprId { first: 0, count: nodes.len() as u32 };
-        let value = expr::evaluate(nodes, id, &mut Environment { context: self, at });
+        let value = expr::evaluate(nodes, id, &mut Environment { context: self, at, computes_words: false });
         let span = nodes.last().map_or(span, |node| node.span);
         value
             .and_then(|value| value.integer().map_err(|fault| EvalError { span, fault }))
@@ -297,9 +313,14 @@ impl Context {
 struct Environment<'c> {
     context: &'c mut Context,
     at: AstPlace,
+    computes_words: bool,
 }
 
 impl expr::Names for Environment<'_> {
+    fn computes_words(&self) -> bool {
+        self.computes_words
+    }
+
     fn value(&mut self, name: NameRef, span: Span) -> Result<Value, EvalError> {
         let name = self.context.name(self.at, name, span);
         name.and_then(|name| self.context.name_value(self.at.scope, name, span))

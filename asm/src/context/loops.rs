@@ -265,6 +265,31 @@ impl Context {
         matches!(binding, Binding::Index(_))
     }
 
+    /// An expression names the index of a loop that is written out, or an argument of a macro that does.
+    pub(crate) fn names_known_index(&self, at: AstPlace, id: ExprId) -> bool {
+        self.asts[at.ast as usize].nodes[id.range()].iter().any(|node| match node.kind {
+            NodeKind::Name(name) => name.resolve().is_ok_and(|name| self.is_known_index(at.scope, name)),
+            _ => false,
+        })
+    }
+
+    fn is_known_index(&self, scope: ScopeId, name: NameId) -> bool {
+        let (mut scope, mut name) = (scope, name);
+        for _ in 0..crate::limits::EVALUATION_DEPTH {
+            let Binding::Argument(argument) = self.lookup(scope, name) else { break };
+            let argument = self.declared.arguments[argument as usize];
+            match argument.operand.kind {
+                OperandKind::Name(inner) => match inner.resolve() {
+                    Ok(inner) => (scope, name) = (argument.at.scope, inner),
+                    Err(_) => return false,
+                },
+                OperandKind::Expr(id) => return self.names_known_index(argument.at, id),
+                _ => return false,
+            }
+        }
+        self.scopes.is_loop_index(scope, name)
+    }
+
     /// The loops that enclose a scope, outer ones first.
     pub(crate) fn loops_around(&self, scope: ScopeId) -> Vec<SourceLoopId> {
         let mut loops = Vec::new();

@@ -428,6 +428,11 @@ impl Resolver<'_> {
         ty: Type,
     ) -> Result<RegisterId, ErrorReported> {
         let operand = Operand { kind: OperandKind::Expr(expr), span };
+        let value = match value {
+            // Where the program computes it, an integer has its low 32 bits.
+            Value::Int(_) if ty != Type::F && self.context.names_known_index(at, expr) => value.word(),
+            value => value,
+        };
         let bits = self.bits(at, value, ty, operand)?;
         Ok(self.pooled(bits, span))
     }

@@ -340,7 +340,9 @@ impl Resolver<'_> {
                 match (terms[0].value(), terms[1].value()) {
                     (Some(a), Some(b)) => {
                         self.same_at_run_time(at, operator, (a, b), run.part(index), span)?;
-                        expr::infix(operator, a, b)
+                        let computes_words = self.context.names_known_index(at, here.1);
+                        let of = if computes_words { expr::infix_of_words } else { expr::infix };
+                        of(operator, a, b)
                     }
                     _ => return self.operator_term(at, line, operator, &terms, here),
                 }
@@ -354,7 +356,13 @@ impl Resolver<'_> {
                 let terms = run.take(count as usize);
                 let values: Option<Vec<Value>> = terms.iter().map(Term::value).collect();
                 match (name.function(), values) {
-                    (Some(function), Some(values)) => expr::call(function, &values),
+                    (Some(function), Some(mut values)) => {
+                        let is_int = values.iter().all(|value| matches!(value, Value::Int(_)));
+                        if is_int && self.context.names_known_index(at, here.1) {
+                            values.iter_mut().for_each(|value| *value = value.word());
+                        }
+                        expr::call(function, &values)
+                    }
                     _ => return self.function(at, line, name, &terms, here),
                 }
             }
@@ -461,7 +469,7 @@ impl Resolver<'_> {
                 Err(self.context.report(at.scope, error))
             }
             (OperandKind::Expr(expr), _) => {
-                let value = self.context.value(place, expr)?;
+                let value = self.context.equation_value(place, expr)?;
                 let value = self.value_of_parameter_type(value, span)?;
                 Ok(Term { form: TermForm::Constant(value, id), span })
             }

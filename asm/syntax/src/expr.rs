@@ -177,6 +177,11 @@ pub trait Names {
     /// # Errors
     /// If no function has the name.
     fn function(&mut self, name: crate::name::NameId, span: Span) -> Result<Function, EvalError>;
+
+    /// Integers are computed as by the machine: [`infix_of_words`].
+    fn computes_words(&self) -> bool {
+        false
+    }
 }
 
 /// The value of an expression, given as the nodes of its tree.
@@ -206,7 +211,8 @@ pub fn evaluate(nodes: &[Node], id: ExprId, names: &mut dyn Names) -> Result<Val
             NodeKind::Prefix(operator) => prefix(operator, pop()).map_err(fault)?,
             NodeKind::Infix(operator) => {
                 let b = pop();
-                infix(operator, pop(), b).map_err(fault)?
+                let of = if names.computes_words() { infix_of_words } else { infix };
+                of(operator, pop(), b).map_err(fault)?
             }
             NodeKind::Call(name, count) => {
                 let function = names.function(name, node.span)?;
@@ -302,6 +308,14 @@ impl Value {
         match self {
             Value::Int(value) => Ok(value),
             Value::Real(value) => whole(value).ok_or(Fault::NotInteger(value)),
+        }
+    }
+
+    /// An integer as the low 32 bits of the value, which are signed; a real number as it is.
+    pub fn word(self) -> Value {
+        match self {
+            Value::Int(value) => Value::Int(i64::from(value as i32)),
+            Value::Real(_) => self,
         }
     }
 
@@ -434,6 +448,22 @@ pub fn infix(operator: Operator, a: Value, b: Value) -> Result<Value, Fault> {
         (Power, ..) if a.is_zero() && b.real() < 0.0 => Err(Fault::DivisionByZero),
         (Power, ..) => real(libm::pow(a.real(), b.real())),
         (Complement | Not, ..) => Ok(a),
+    }
+}
+
+/// The value of an infix operator on integers as the machine computes it, with 32 bits: where a result depends on more than the low bits of an
+/// operand, and after `<<`. Sums and products keep all their bits until then.
+///
+/// # Errors
+/// The faults of [`infix`].
+pub fn infix_of_words(operator: Operator, a: Value, b: Value) -> Result<Value, Fault> {
+    use Operator::*;
+    match (operator, a, b) {
+        (Shl, Value::Int(_), Value::Int(_)) => infix(operator, a.word(), b).map(Value::word),
+        (Shr | And | Or | Eq | Ne | Lt | Le | Gt | Ge, Value::Int(_), Value::Int(_)) => {
+            infix(operator, a.word(), b.word())
+        }
+        _ => infix(operator, a, b),
     }
 }
 

@@ -215,8 +215,15 @@ fn driver(program: &Program, translation: &Translation, periods: usize) -> Strin
 }
 
 /// Options of the oracle.
-pub(crate) const GCC: [&str; 6] =
-    ["-O0", "-fwrapv", "-ffp-contract=off", "-std=c99", "-fsingle-precision-constant", "-w"];
+pub(crate) const GCC: [&str; 7] = [
+    "-O0",
+    "-fwrapv",
+    "-ffp-contract=off",
+    "-frounding-math",
+    "-std=c99",
+    "-fsingle-precision-constant",
+    "-w",
+];
 
 /// Outputs of several programs by gcc, in one compilation.
 pub(crate) fn compiled(

@@ -30,6 +30,13 @@ struct Counter {
     alone: bool,
 }
 
+/// The bound of a loop: by its counter if the body leaves that to the step, otherwise as given.
+#[derive(Clone, Copy)]
+struct LoopBound {
+    given: Option<u64>,
+    counter: Option<Counter>,
+}
+
 /// A scalar that the body changes.
 #[derive(Clone, Copy)]
 enum Carried {
@@ -47,6 +54,19 @@ const NONE: &str =
     "a value that a loop changes, which is too long to be written out, and that no register holds";
 
 type Cells = BTreeMap<(usize, usize), Carried>;
+
+/// Iterations of a loop from a counter's first value to its end.
+fn iterations(operator: &BinaryOperator, first: i64, end: i64, by: i64) -> Option<i64> {
+    let count = match operator {
+        BinaryOperator::Less if by > 0 => (end - first + by - 1).div_euclid(by),
+        BinaryOperator::LessOrEqual if by > 0 => (end - first + by).div_euclid(by),
+        BinaryOperator::Greater if by < 0 => (first - end - by - 1).div_euclid(-by),
+        BinaryOperator::GreaterOrEqual if by < 0 => (first - end - by).div_euclid(-by),
+        BinaryOperator::NotEquals if by != 0 && (end - first) % by == 0 => (end - first) / by,
+        _ => return None,
+    };
+    Some(count.max(0))
+}
 
 impl<'a> Exec<'a> {
     pub(super) fn rolled(
@@ -71,15 +91,16 @@ impl<'a> Exec<'a> {
                 Err(error) => return Err(error),
             }
         }
-        let mut bound = parts.bound.or(counter.map(|counter| counter.count.max(1) as u64));
-        if bound.is_none() && self.is_wrap(&parts) {
+        let mut bound = parts.bound;
+        let counter = counter.filter(|_| bound.is_none());
+        if bound.is_none() && counter.is_none() && self.is_wrap(&parts) {
             bound = Some(WRAPS);
         }
-        let bound = bound.or(self.loop_bound);
-        let Some(bound) = bound else {
+        let bound = LoopBound { given: bound.or(self.loop_bound), counter };
+        if bound.given.is_none() && bound.counter.is_none() {
             self.at = parts.head;
             return self.fail(NO_BOUND);
-        };
+        }
         if parts.body_first {
             return self.repeated(&parts, bound, out);
         }
@@ -156,15 +177,7 @@ impl<'a> Exec<'a> {
             return Ok(None);
         };
         let Some((operator, end, alone)) = self.comparison(condition, name)? else { return Ok(None) };
-        let count = match operator {
-            BinaryOperator::Less if by > 0 => (end - first + by - 1).div_euclid(by),
-            BinaryOperator::LessOrEqual if by > 0 => (end - first + by).div_euclid(by),
-            BinaryOperator::Greater if by < 0 => (first - end - by - 1).div_euclid(-by),
-            BinaryOperator::GreaterOrEqual if by < 0 => (first - end - by).div_euclid(-by),
-            BinaryOperator::NotEquals if by != 0 && (end - first) % by == 0 => (end - first) / by,
-            _ => return Ok(None),
-        };
-        let count = count.max(0);
+        let Some(count) = iterations(&operator, first, end, by) else { return Ok(None) };
         let last = first + count * by;
         let (least, most) = integer.limits();
         let narrow = integer.bits <= 32 || first.min(last) >= 0;
@@ -172,6 +185,20 @@ impl<'a> Exec<'a> {
             return Ok(None);
         }
         Ok(Some(Counter { object, first, step: by, count, alone }))
+    }
+
+    /// The most iterations of a loop whose end its body may change: the memory is that of any iteration.
+    fn most_iterations(&mut self, parts: &Repetition<'a>, counter: Counter) -> Result<Option<u64>, Error> {
+        let Some(condition) = parts.condition else { return Ok(None) };
+        let name = self.objects[counter.object].name.clone();
+        let saved = self.saved();
+        self.blocks.push(Vec::new());
+        let found = self.comparison(condition, &name);
+        self.undecided = None;
+        self.restore(saved);
+        let Some((operator, end, _)) = found? else { return Ok(None) };
+        let count = iterations(&operator, counter.first, end, counter.step).filter(|count| *count <= MOST);
+        Ok(count.map(|count| count.max(counter.count).max(1) as u64))
     }
 
     /// The variable that a step advances, and its increment.
@@ -324,7 +351,7 @@ impl<'a> Exec<'a> {
     fn repeated(
         &mut self,
         parts: &Repetition<'a>,
-        bound: u64,
+        bound: LoopBound,
         out: &mut Vec<Outcome>,
     ) -> Result<Condition, Error> {
         let ty = Type::Int(INT);
@@ -339,14 +366,21 @@ impl<'a> Exec<'a> {
             let saved = self.saved();
             self.blocks.push(Vec::new());
             self.enter_cells(&cells)?;
+            let counting = bound.counter.map(|counter| self.memory.0[counter.object].clone());
             let mut outcomes = Vec::new();
             let normal = self.statement(parts.body, &mut outcomes)?;
             let mut leaves = Vec::new();
             let normal = self.absorbed(normal, outcomes, &|exit| *exit == Exit::Continue, &mut leaves)?;
+            let counter =
+                bound.counter.filter(|counter| counting.as_ref() == Some(&self.memory.0[counter.object]));
+            let mut counted = None;
             self.either(
                 normal,
                 &mut |exec, _| {
                     exec.stepped(parts)?;
+                    if let Some(counter) = counter {
+                        counted = exec.most_iterations(parts, counter)?;
+                    }
                     let condition = exec.goes_on(parts)?;
                     let value = exec.value_of(condition);
                     exec.memory.set(again, 0, value);
@@ -381,6 +415,10 @@ impl<'a> Exec<'a> {
                 self.restore(saved);
                 continue;
             }
+            let Some(bound) = counted.or(bound.given) else {
+                self.at = parts.head;
+                return self.fail(NO_BOUND);
+            };
             let goes_on = match self.register(&goes_on, &ty) {
                 Some(id) => id,
                 None => return self.fail("expected a number as the loop's condition"),

@@ -209,6 +209,8 @@ impl Speller<'_> {
             return format!("{name}({first}, {second})");
         };
         let name = match op {
+            // From 2^31 on the divisor fits once or not: the general macro's choice, which is a constant.
+            Op::UnsignedDiv if by < 0 => return format!("quotient_unsigned({first}, {second})"),
             Op::UnsignedDiv => "quotient_unsigned_by",
             _ if within(a, 1 << 22) => "quotient_short_by",
             _ => "quotient_by",
