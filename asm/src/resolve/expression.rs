@@ -356,13 +356,7 @@ impl Resolver<'_> {
                 let terms = run.take(count as usize);
                 let values: Option<Vec<Value>> = terms.iter().map(Term::value).collect();
                 match (name.function(), values) {
-                    (Some(function), Some(mut values)) => {
-                        let is_int = values.iter().all(|value| matches!(value, Value::Int(_)));
-                        if is_int && self.context.names_known_index(at, here.1) {
-                            values.iter_mut().for_each(|value| *value = value.word());
-                        }
-                        expr::call(function, &values)
-                    }
+                    (Some(function), Some(values)) => expr::call(function, &values),
                     _ => return self.function(at, line, name, &terms, here),
                 }
             }
