@@ -147,7 +147,8 @@ fn loops_that_call_themselves_are_errors() {
 #[test]
 fn the_index_of_an_iteration_that_is_written_out_has_32_bits() {
     type Function = fn(i32) -> i32;
-    let parts: [(&str, Function); 8] = [
+    let parts: [(&str, Function); 9] = [
+        ("(v*100000000)/256", |v| v.wrapping_mul(100_000_000) / 256),
         ("(v << 24) >> 24", |v| (v << 24) >> 24),
         ("(v*100000000) >> 3", |v| v.wrapping_mul(100_000_000) >> 3),
         ("v*100000000", |v| v.wrapping_mul(100_000_000)),

@@ -273,7 +273,8 @@ impl Context {
         })
     }
 
-    fn is_known_index(&self, scope: ScopeId, name: NameId) -> bool {
+    /// A name is the index of a loop that is written out, or an argument of a macro that depends on such an index.
+    pub(crate) fn is_known_index(&self, scope: ScopeId, name: NameId) -> bool {
         let (mut scope, mut name) = (scope, name);
         for _ in 0..crate::limits::EVALUATION_DEPTH {
             let Binding::Argument(argument) = self.lookup(scope, name) else { break };

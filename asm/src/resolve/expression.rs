@@ -339,10 +339,13 @@ impl Resolver<'_> {
                 let terms = run.take(2);
                 match (terms[0].value(), terms[1].value()) {
                     (Some(a), Some(b)) => {
-                        self.same_at_run_time(at, operator, (a, b), run.part(index), span)?;
-                        let computes_words = self.context.names_known_index(at, here.1);
-                        let of = if computes_words { expr::infix_of_words } else { expr::infix };
-                        of(operator, a, b)
+                        if self.context.names_known_index(at, here.1) {
+                            let words = (a.word(), b.word());
+                            self.same_at_run_time(at, operator, words, run.part(index), span)?;
+                            expr::infix_of_words(operator, a, b)
+                        } else {
+                            expr::infix(operator, a, b)
+                        }
                     }
                     _ => return self.operator_term(at, line, operator, &terms, here),
                 }

@@ -269,7 +269,7 @@ impl Resolver<'_> {
             NodeKind::Name(name) => name.resolve().ok(),
             _ => None,
         });
-        let Some(index) = names.find(|name| self.context.scopes.is_loop_index(at.scope, *name)) else {
+        let Some(index) = names.find(|name| self.context.is_known_index(at.scope, *name)) else {
             return Ok(());
         };
         let index = self.context.scopes.text(index).to_owned();

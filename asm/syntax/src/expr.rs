@@ -460,7 +460,7 @@ pub fn infix_of_words(operator: Operator, a: Value, b: Value) -> Result<Value, F
     use Operator::*;
     match (operator, a, b) {
         (Shl, Value::Int(_), Value::Int(_)) => infix(operator, a.word(), b).map(Value::word),
-        (Shr | And | Or | Eq | Ne | Lt | Le | Gt | Ge, Value::Int(_), Value::Int(_)) => {
+        (Shr | Div | Rem | And | Or | Eq | Ne | Lt | Le | Gt | Ge, Value::Int(_), Value::Int(_)) => {
             infix(operator, a.word(), b.word())
         }
         _ => infix(operator, a, b),
