@@ -126,8 +126,8 @@ pub(super) fn table(routed: &[RoutedMachine], family: &'static Family, out: &mut
     ];
     let columns = Columns::new(&columns, out.page());
     writeln!(out, "\nplaced and routed ({}), at the median clock", place::device(family)?)?;
-    let head =
-        ["machine", "time µs", "MHz", "least to most", family.lut, "RAM", "mult.", "estimated MHz, LUTs"];
+    let estimated = format!("estimated MHz, {}", family.cells_text());
+    let head = ["machine", "time µs", "MHz", "least to most", family.lut, "RAM", "mult.", &estimated];
     out.lines(&columns.row(&head, None))?;
     for row in routed {
         let (Some(first), Some(median), Some(time)) = (row.seeds.first(), row.median(), row.time) else {
