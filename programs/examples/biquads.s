@@ -4,6 +4,8 @@
 ; Coefficients are computed by the assembler from the corner frequency;
 ; the state is in registers, so that nothing is loaded or stored, and a
 ; section's output waits for two operations of its input only.
+;
+; In this folder: takt run biquads.s --inputs biquads.csv
 
 .schedule on
 

@@ -1,7 +1,7 @@
 ; Field-oriented control of a permanent-magnet synchronous motor:
 ; Clarke, Park, two PI controllers with decoupling and a voltage limit,
 ; inverse Park, and space-vector modulation by the middle of the phases.
-;
+; In this folder: takt run foc.s --plant plant/pmsm.toml --periods 320
 ; An integrator follows what the bridge gives its axis beyond the
 ; decoupling: s' = s + KI·(u - f - s). Within the limits, u - f - s is
 ; KP·e, so that the gain of the integral is KP·KI/T = wc·R; at the

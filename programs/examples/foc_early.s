@@ -2,6 +2,8 @@
 ; as the currents allow: what needs neither current (the rotor's
 ; direction, the bridge's limits, the decoupling) is computed for the
 ; next period once the duties are published.
+;
+; In this folder: takt run foc_early.s --plant plant/pmsm.toml --periods 320
 
 .schedule on
 .ports  latched

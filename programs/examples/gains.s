@@ -1,5 +1,7 @@
 ; A motor's speed controller in four equations, whose gains a host sets
 ; while it runs: a slider here, `takt live param` on a board.
+;
+; In this folder: takt run gains.s --plant plant/dc_motor.toml --periods 400
 
 .schedule on
 

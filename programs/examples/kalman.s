@@ -1,6 +1,6 @@
 ; A Kalman filter of four states: position and velocity in two
 ; directions, of which the two positions are measured.
-;
+; In this folder: takt run kalman.s --inputs kalman.csv
 ; Model x' = F·x + noise Q, z = H·x + noise R. Every matrix is written
 ; out by repetitions, of a symmetric one its upper half; what is zero or
 ; one in F and H costs nothing, because it is not there: F adds T times

@@ -1,7 +1,7 @@
 ; Four linear equations, A·x = b, by elimination with partial pivoting:
 ; no branches, rows are exchanged by selection, so that the time is the
 ; same whatever the matrix, and the scheduler sees one straight line.
-;
+; In this folder: takt run lu.s --inputs lu.csv
 ; Each period has equations of its own. Period 30 of lu.csv has none to
 ; solve: its matrix has no inverse, which divides by zero, raises the
 ; flags `invalid` and `divide-by-zero`, and sets `singular`.

@@ -1,6 +1,9 @@
 ; A pendulum on a cart, kept upright by feedback of the state and of the
 ; integral of the cart's position; the gains are those of a
 ; linear-quadratic regulator for the parameters of cart_pendulum.toml.
+;
+; In this folder:
+;   takt run pendulum.s --plant plant/cart_pendulum.toml --periods 6000
 
 .schedule on
 

@@ -2,7 +2,7 @@
 ; what the actuator cannot do is fed back into it.
 ;
 ;   v = KP·e + s,  u = v within ±UMAX,  s' = s + T·(KI·e + (u - v)/TT)
-
+; In this folder: takt run pi.s --plant plant/dc_motor.toml --periods 400
 .schedule on
 
 .const  T    = 1e-3                     ; s, sampling period

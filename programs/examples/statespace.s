@@ -2,6 +2,7 @@
 ; linear-quadratic-Gaussian design gives it. It quiets six masses in a
 ; chain of springs; statespace.csv is a record of its loop, in which a
 ; mass gets a blow and later a lasting push (plant/chain.py).
+; In this folder: takt run statespace.s --inputs statespace.csv
 ;
 ;   x' = A·x + B·y      u = C·x + D·y
 ;

@@ -1,6 +1,8 @@
 ; A thermistor read through a divider: voltage to temperature by a table
 ; in data memory, interpolated. Memory is right here: the entry depends
 ; on a measurement, which no register's name can.
+;
+; In this folder: takt run table.s --inputs table.csv
 
 .include <math.s>
 .schedule on
@@ -11,7 +13,7 @@
 .const  R25  = 10e3                     ; Ω, at 25 °C
 .const  B    = 3950                     ; K
 .const  LOW  = 0.1                      ; V, of the table's first entry
-.const  HIGH = 3.2                      ; and of its last
+.const  HIGH = 3.2                      ; V, and of its last
 .const  N    = 64                       ; intervals
 .const  STEP = (HIGH - LOW)/N           ; V
 

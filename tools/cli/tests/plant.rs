@@ -287,6 +287,39 @@ fn a_program_without_inputs_is_told_its_plant() {
     assert!(done.starts_with("400 periods on t3"), "{done}");
 }
 
+/// The picture of a run from a table has its inputs, too, and the output table has not.
+#[test]
+fn a_picture_from_a_table_shows_its_inputs() {
+    let folder = Folder::new();
+    let [program, table] =
+        ["biquads.s", "biquads.csv"].map(|name| format!("{}/../{name}", example().display()));
+    folder.line(&format!("run {program} --inputs {table} --plot filter.svg --outputs out.csv"));
+    let svg = folder.read_text("filter.svg");
+    let missing: Vec<_> =
+        ["x", "y", "V"].iter().filter(|text| !svg.contains(&format!("\n{text}\n"))).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+    assert!(folder.read_text("out.csv").starts_with("y,cycles\n"));
+}
+
+/// The picture in docs/examples.md is of its example as it is: TAKT_BLESS=1 draws it.
+#[test]
+fn the_picture_of_the_examples_is_fresh() {
+    let folder = Folder::new();
+    for (name, file) in [("pi.s", "../pi.s"), ("dc_motor.toml", "dc_motor.toml")] {
+        folder.write(name, std::fs::read_to_string(example().join(file)).unwrap());
+    }
+    folder.line("run pi.s --plant dc_motor.toml --periods 400 --plot pi.svg");
+    let drawn = folder.read_text("pi.svg");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/pictures/pi.svg");
+    if std::env::var_os("TAKT_BLESS").is_some() {
+        std::fs::write(path, &drawn).unwrap();
+    }
+    assert!(
+        std::fs::read_to_string(path).is_ok_and(|old| old == drawn),
+        "{path} is stale: TAKT_BLESS=1 draws it"
+    );
+}
+
 /// The picture of a loop names its file, has units, and shows a sensor's state once.
 #[test]
 fn the_picture_of_a_loop_has_units() {

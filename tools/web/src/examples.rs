@@ -57,13 +57,13 @@ const MOTOR: KnownExample = KnownExample { plant: Some("dc_motor"), periods: Som
 #[rustfmt::skip]
 const KNOWN: [KnownExample; 12] = [
     KnownExample { name: "pi.s", short: "motor speed, PI",
-        text: "For makers of speed controllers. Try KP at 0.3, and the speed overshoots; at 2, it arrives too late.", ..MOTOR },
+        text: "For makers of speed controllers. Try KP at 0.3, and the speed overshoots; at 1.6, it arrives too late.", ..MOTOR },
     KnownExample { name: "gains.s", short: "motor speed, equations",
         text: "For those who tune while the motor turns. Try \"set from period\" 200, then drag kp: the run changes from there on.", ..MOTOR },
     KnownExample { name: "tracking.s", short: "five-axis robot",
         text: "For makers of robots. Try the tab Robot, where it follows its path, and the tab Pipeline, with each cycle of a period.", seconds: Some(3), ..PLAIN },
     KnownExample { name: "pendulum.s", short: "pendulum on a cart",
-        text: "For makers of machines that balance. Try KA at 15, and the pendulum swings.", plant: Some("cart_pendulum"), periods: Some(6000), plotted: Some(&["force", "angle", "x", "x_ref"]), ..PLAIN },
+        text: "For makers of machines that balance. Try KA at 15, and the pendulum swings ever further.", plant: Some("cart_pendulum"), periods: Some(6000), plotted: Some(&["force", "angle", "x", "x_ref"]), ..PLAIN },
     KnownExample { name: "foc.s", short: "motor current",
         text: "For makers of motor drives. Try wc at 1500, and the currents follow more slowly.", ..CONTROL },
     KnownExample { name: "blink.s", short: "blinking lamp",

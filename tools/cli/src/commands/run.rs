@@ -83,7 +83,7 @@ pub(crate) struct Run {
     #[command(flatten)]
     plant: PlantArguments,
     /// Draw the columns of the table of --outputs over time, as SVG: the output ports; with --plant, the input ports and the plant's states,
-    /// too.
+    /// too. The input ports of --inputs are drawn as well.
     #[arg(long, value_name = "SVG", conflicts_with = "batch")]
     plot: Option<PathBuf>,
     #[command(flatten)]
@@ -197,10 +197,12 @@ impl Run {
         let (inputs, outputs) = (self.inputs.as_deref(), self.shown.outputs.as_deref());
         let result = match self.has_rows() {
             true => {
-                let curves = self
-                    .plot
-                    .is_some()
-                    .then(|| RefCell::new(Curves::new(run.titles(), run.period()).with_units(run.units())));
+                let curves = self.plot.is_some().then(|| {
+                    let (mut titles, mut units): (Vec<_>, Vec<_>) = run.further_curves().into_iter().unzip();
+                    titles.extend(run.titles());
+                    units.extend(run.units());
+                    RefCell::new(Curves::new(titles, run.period()).with_units(units))
+                });
                 let tables = Tables { inputs, outputs, curves: curves.as_ref(), most: self.periods };
                 let result = tables.drive(&mut run);
                 // What came before a fault is worth a picture.
@@ -246,6 +248,7 @@ impl Run {
             watch,
             periods,
             last: 0,
+            reads_table: self.inputs.is_some(),
             plant,
         })
     }
@@ -280,6 +283,8 @@ struct ProgramRun<'a, 't> {
     periods: CorePeriods,
     /// Cycles of the last period.
     last: Cycle,
+    /// The inputs come from a table.
+    reads_table: bool,
     plant: Option<ProgramLoop>,
 }
 
@@ -301,6 +306,13 @@ impl ProgramRun<'_, '_> {
             self.emulator.set_input_bits(register, bits)?;
         }
         Ok(())
+    }
+}
+
+impl ProgramRun<'_, '_> {
+    /// Inputs that the curves show beside the output table: those of a table. With a plant, the output table has all inputs.
+    fn drawn_inputs(&self) -> &[Port] {
+        if self.reads_table && self.plant.is_none() { &self.program.inputs } else { &[] }
     }
 }
 
@@ -335,6 +347,18 @@ impl TableApplication for ProgramRun<'_, '_> {
         let Some(plant) = &self.plant else { return names.chain(["cycles".to_owned()]).collect() };
         let inputs = self.program.inputs.iter().map(|port| port.name.clone());
         inputs.chain(names).chain(plant.state_names()).chain(["cycles".to_owned()]).collect()
+    }
+
+    fn further_curves(&self) -> Vec<(String, Option<String>)> {
+        let unit = |port: &Port| units::unit(&self.loaded.sources, ".input", &port.name);
+        self.drawn_inputs().iter().map(|port| (port.name.clone(), unit(port))).collect()
+    }
+
+    fn further_values(&self) -> Vec<String> {
+        let ports = self.drawn_inputs().iter();
+        let text =
+            |port: &Port| self.emulator.register(port.register).map(|bits| ports::format(port.ty, bits));
+        ports.map(|port| text(port).unwrap_or_default()).collect()
     }
 
     fn row(&mut self, row: &Row) -> Result<bool> {

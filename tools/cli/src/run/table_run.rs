@@ -35,6 +35,16 @@ pub(crate) trait TableApplication {
         Vec::new()
     }
 
+    /// Columns of the curves that the output table lacks, and their units: they come before it.
+    fn further_curves(&self) -> Vec<(String, Option<String>)> {
+        Vec::new()
+    }
+
+    /// Values of these columns after the last row.
+    fn further_values(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Runs up to the time of the first row.
     fn begin(&mut self) -> Result<()> {
         Ok(())
@@ -83,7 +93,7 @@ impl Tables<'_> {
             *rows += 1;
             bar.add(1);
             if let Some(curves) = self.curves {
-                curves.borrow_mut().add(&driven.values());
+                curves.borrow_mut().add(&[driven.further_values(), driven.values()].concat());
             }
             if let Some(outputs) = &mut outputs {
                 ports::write_row(outputs, driven.values())?;

@@ -89,7 +89,8 @@ export class Documents {
     parent.replaceChildren(...all.map((one) => {
       const origin = { link: "from a link", example: "example" }[one.from] ?? "";
       const name = button({ textContent: one.name, title: `${one.name}${origin && `, ${origin}`}${one.changed ? ", changed by you" : ""}`, onclick: () => one.id === here || open(one) });
-      name.append(" ", Object.assign(document.createElement("small"), { textContent: one.changed ? "yours" : origin }));
+      const alike = all.filter(({ name, changed }) => changed && name === one.name), number = alike.indexOf(one) + 1;
+      name.append(" ", Object.assign(document.createElement("small"), { textContent: !one.changed ? origin : number > 1 ? `yours, ${number}` : "yours" }));
       if (one.id === here) name.setAttribute("aria-current", "true");
       const entry = document.createElement("span");
       entry.className = one.id === here ? "here" : "";

@@ -6,7 +6,7 @@ import { Drive } from "./drive.js";
 import { Editor, reader } from "./editor.js";
 import { LINK_CHARACTERS, pack, unpack } from "./link.js";
 import { Plots } from "./plot.js";
-import { save, short } from "./parts.js";
+import { binary32, save, short } from "./parts.js";
 import { REPLACED, Stopped, Thread, fetched, load } from "./thread.js";
 import { Tuning } from "./tuning.js";
 import "./style.css";
@@ -359,7 +359,7 @@ function empty() {
   parameters.clear();
   plant.clear();
   el("loop").hidden = true;
-  plots.clear(why);
+  plots.clear(why, `${state.document?.id} ${state.name}`);
   pipeline.show(null);
   clearView();
   for (const id of ["ran", "fault", "text", "answer"]) el(id).textContent = "";
@@ -519,7 +519,8 @@ const from = () => Math.max(1, Math.round(Number(el("from").value)) || 1);
 /** Text of a parameter's value in the period from which on the sliders act. */
 function parameterOf(name) {
   const last = state.changes.filter((one) => one.name === name && one.period <= from()).at(-1);
-  return String(last?.value ?? state.parameters[name] ?? state.program?.parameters?.find((one) => one.name === name)?.value);
+  const value = last?.value ?? state.parameters[name] ?? state.program?.parameters?.find((one) => one.name === name)?.value;
+  return typeof value === "number" ? binary32(value) : String(value);
 }
 
 function setParameters(texts) {

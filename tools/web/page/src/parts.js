@@ -28,6 +28,15 @@ export function short(value) {
   return power.length < plain.length ? power : plain;
 }
 
+/** Shortest decimal text of a number that is a binary32 (0.3 for 0.30000001192092896), and of another its own. */
+export function binary32(value) {
+  for (let digits = 1; digits <= 9; digits++) {
+    const near = Number(value.toPrecision(digits));
+    if (Math.fround(near) === value) return String(near);
+  }
+  return String(value);
+}
+
 /** Offers a file for download. */
 export function save(name, content, type) {
   const link = document.createElement("a");

@@ -264,7 +264,7 @@ export class Plots {
   /** `mark`: parameters that change during the run (`changes`), the period from which their sliders act (`from`), and what hears of another (`picked`).
    * @param tools controls: `axis` (periods, ms or s), `length` (of a period, in ms), `together` (curves over one axis: by unit, or each alone) */
   constructor(parent, choice, tools) {
-    Object.assign(this, { parent, choice, tools, charts: [], chosen: new Map() });
+    Object.assign(this, { parent, choice, tools, charts: [], chosen: new Map(), choices: new Map() });
     tools.axis.addEventListener("change", () => (this.axis = tools.axis.value));
     tools.length.addEventListener("change", () => (this.length = Number(tools.length.value) / 1e3));
     for (const one of Object.values(tools)) one.addEventListener("change", () => this.draw());
@@ -272,8 +272,10 @@ export class Plots {
     new ResizeObserver(() => this.size()).observe(parent.parentElement);
   }
 
-  /** Forgets everything about the text before, and shows `why`. */
-  clear(why) {
+  /** Forgets everything about the text before, and shows `why`. `of`: key of the text, whose choice of ports comes back. */
+  clear(why, of) {
+    this.chosen = this.choices.get(of) ?? new Map();
+    this.choices.set(of, this.chosen);
     Object.assign(this, { before: null, axis: undefined, length: undefined });
     this.show(null, null, why);
   }

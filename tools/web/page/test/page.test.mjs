@@ -6,6 +6,7 @@ import { after, afterEach, before, test } from "node:test";
 import { deflateSync } from "node:zlib";
 import { chromium } from "playwright-core";
 import { serve } from "../serve.mjs";
+import { binary32 } from "../src/parts.js";
 import { VISIONS, ciede2000, distance } from "./colours.mjs";
 
 const FOLDER = process.env.TAKT_PAGE;
@@ -76,6 +77,8 @@ test("the integrator assembles and runs when the page opens, coloured by the lan
   await done(page);
   assert.match(await cycles(page), /pi\.s on t3: 38 cycles a period, 0\.304 µs at 125 MHz · proved: at most 43, whatever the inputs$/);
   assert.match(await page.textContent("#more-text"), /^measured in 400 periods · no schedule takes fewer than 38 cycles · period takes 38 to 43 whatever the inputs · before the first period 9$/);
+  await page.click("#more summary");
+  assert.ok((await page.locator("#more summary").boundingBox()).width < 80, "a button, not a bar");
   // All colours come from the server: if the page had a lexer of its own, this would fail.
   await page.waitForSelector(".tok-function");
   const instruction = await page.textContent(".tok-function");
@@ -1034,6 +1037,37 @@ test("a parameter that is set in the middle of a run acts on the rest of it", li
   await page.waitForFunction(() => !takt.state.stale && !takt.state.changes.length);
   await done(page);
   assert.deepEqual(await values(page, "w"), before);
+  assert.deepEqual(errors, []);
+});
+
+test("a text has its own choice of ports, its values as written, and a number beside another of its name", limit, async () => {
+  assert.deepEqual([0.3, 0.1, 1 / 3, 4, 1e-9, 16777216].map((value) => binary32(Math.fround(value))), ["0.3", "0.1", "0.33333334", "4", "1e-9", "16777216"]);
+  assert.deepEqual([0.1 + 0.2, NaN, -Infinity].map(binary32), ["0.30000000000000004", "NaN", "-Infinity"]);
+  const { page, errors } = await open("#example=tracking.s");
+  const shows = async (name) => {
+    await page.waitForFunction((name) => takt.state.name === name && takt.state.run && takt.state.program, name);
+    await done(page);
+  };
+  const box = (name) => page.locator("#choice label", { hasText: name }).locator("input");
+  await shows("tracking.s");
+  await page.selectOption("#example", "biquads.s");
+  await shows("biquads.s");
+  assert.ok(await box("x (in)").isChecked(), "the robot's program has an input x, too, which is not plotted");
+  await page.selectOption("#example", "gains.s");
+  await shows("gains.s");
+  for (const yours of ["yours", "yours, 2"]) {
+    const field = page.locator("#parameters .constant", { hasText: "kp" }).locator(".field");
+    await field.fill("0.5");
+    await field.press("Enter");
+    await page.waitForFunction(() => !takt.state.stale && Object.keys(takt.state.parameters).length);
+    await done(page);
+    assert.equal(await page.textContent(".ghost"), "pale: before, with kp = 0.3");
+    await page.waitForFunction((yours) => document.querySelector("#documents .here small").textContent === yours, yours);
+    if (yours !== "yours") continue;
+    await page.selectOption("#example", "gains.s");
+    await page.waitForFunction(() => !Object.keys(takt.state.parameters).length);
+    await shows("gains.s");
+  }
   assert.deepEqual(errors, []);
 });
 
