@@ -241,41 +241,47 @@ impl Context {
 
     /// An expression names the index of a loop at run time.
     pub(crate) fn names_index(&self, at: AstPlace, id: ExprId) -> bool {
-        self.asts[at.ast as usize].nodes[id.range()].iter().any(|node| match node.kind {
-            NodeKind::Name(name) => name.resolve().is_ok_and(|name| self.is_index(at.scope, name)),
-            _ => false,
-        })
+        self.depends(at, id, Context::is_index_itself)
     }
 
     /// A name is the index of a loop at run time, or an argument of a macro that depends on such an index.
     pub(crate) fn is_index(&self, scope: ScopeId, name: NameId) -> bool {
-        let mut binding = self.lookup(scope, name);
-        for _ in 0..crate::limits::EVALUATION_DEPTH {
-            let Binding::Argument(argument) = binding else { break };
-            let argument = self.declared.arguments[argument as usize];
-            match argument.operand.kind {
-                OperandKind::Name(inner) => match inner.resolve() {
-                    Ok(inner) => binding = self.lookup(argument.at.scope, inner),
-                    Err(_) => return false,
-                },
-                OperandKind::Expr(id) => return self.names_index(argument.at, id),
-                _ => return false,
-            }
-        }
-        matches!(binding, Binding::Index(_))
+        self.leads_to(scope, name, Context::is_index_itself)
+    }
+
+    fn is_index_itself(&self, scope: ScopeId, name: NameId) -> bool {
+        matches!(self.lookup(scope, name), Binding::Index(_))
     }
 
     /// An expression names the index of a loop that is written out, or an argument of a macro that does.
     pub(crate) fn names_known_index(&self, at: AstPlace, id: ExprId) -> bool {
-        self.asts[at.ast as usize].nodes[id.range()].iter().any(|node| match node.kind {
-            NodeKind::Name(name) => name.resolve().is_ok_and(|name| self.is_known_index(at.scope, name)),
-            _ => false,
-        })
+        self.depends(at, id, Context::is_known_index_itself)
     }
 
     /// A name is the index of a loop that is written out, or an argument of a macro that depends on such an index.
     pub(crate) fn is_known_index(&self, scope: ScopeId, name: NameId) -> bool {
-        let (mut scope, mut name) = (scope, name);
+        self.leads_to(scope, name, Context::is_known_index_itself)
+    }
+
+    fn is_known_index_itself(&self, scope: ScopeId, name: NameId) -> bool {
+        self.scopes.is_loop_index(scope, name)
+    }
+
+    /// An expression has a name that leads to one of which `is` holds.
+    fn depends(&self, at: AstPlace, id: ExprId, is: fn(&Context, ScopeId, NameId) -> bool) -> bool {
+        self.asts[at.ast as usize].nodes[id.range()].iter().any(|node| match node.kind {
+            NodeKind::Name(name) => name.resolve().is_ok_and(|name| self.leads_to(at.scope, name, is)),
+            _ => false,
+        })
+    }
+
+    /// `is` holds of a name, or of a name in the argument of a macro that it stands for.
+    fn leads_to(
+        &self,
+        mut scope: ScopeId,
+        mut name: NameId,
+        is: fn(&Context, ScopeId, NameId) -> bool,
+    ) -> bool {
         for _ in 0..crate::limits::EVALUATION_DEPTH {
             let Binding::Argument(argument) = self.lookup(scope, name) else { break };
             let argument = self.declared.arguments[argument as usize];
@@ -284,11 +290,11 @@ impl Context {
                     Ok(inner) => (scope, name) = (argument.at.scope, inner),
                     Err(_) => return false,
                 },
-                OperandKind::Expr(id) => return self.names_known_index(argument.at, id),
+                OperandKind::Expr(id) => return self.depends(argument.at, id, is),
                 _ => return false,
             }
         }
-        self.scopes.is_loop_index(scope, name)
+        is(self, scope, name)
     }
 
     /// The loops that enclose a scope, outer ones first.
