@@ -307,12 +307,15 @@ impl ProgramRun<'_, '_> {
         }
         Ok(())
     }
-}
 
-impl ProgramRun<'_, '_> {
     /// Inputs that the curves show beside the output table: those of a table. With a plant, the output table has all inputs.
     fn drawn_inputs(&self) -> &[Port] {
         if self.reads_table && self.plant.is_none() { &self.program.inputs } else { &[] }
+    }
+
+    /// Units that the source gives ports, as far as it does.
+    fn units_of(&self, directive: &'static str, ports: &[Port]) -> Vec<Option<String>> {
+        ports.iter().map(|port| units::unit(&self.loaded.sources, directive, &port.name)).collect()
     }
 }
 
@@ -320,14 +323,10 @@ impl TableApplication for ProgramRun<'_, '_> {
     const ROWS: &'static str = "periods";
 
     fn units(&self) -> Vec<Option<String>> {
-        let ports = |directive: &'static str, ports: &'_ [Port]| {
-            let unit = move |port: &Port| units::unit(&self.loaded.sources, directive, &port.name);
-            ports.iter().map(unit).collect::<Vec<_>>()
-        };
-        let outputs =
-            ports(".output", &self.program.outputs).into_iter().chain(self.words.iter().map(|_| None));
+        let outputs = self.units_of(".output", &self.program.outputs).into_iter();
+        let outputs = outputs.chain(self.words.iter().map(|_| None));
         let Some(plant) = &self.plant else { return outputs.collect() };
-        let inputs = ports(".input", &self.program.inputs).into_iter();
+        let inputs = self.units_of(".input", &self.program.inputs).into_iter();
         inputs.chain(outputs).chain(plant.state_units()).collect()
     }
 
@@ -350,8 +349,8 @@ impl TableApplication for ProgramRun<'_, '_> {
     }
 
     fn further_curves(&self) -> Vec<(String, Option<String>)> {
-        let unit = |port: &Port| units::unit(&self.loaded.sources, ".input", &port.name);
-        self.drawn_inputs().iter().map(|port| (port.name.clone(), unit(port))).collect()
+        let names = self.drawn_inputs().iter().map(|port| port.name.clone());
+        names.zip(self.units_of(".input", self.drawn_inputs())).collect()
     }
 
     fn further_values(&self) -> Vec<String> {
