@@ -125,13 +125,9 @@ fn watch(board: &Board, wiring: &Wiring) -> Option<String> {
     takt_clock_watch #(.DIVIDE({divide}), .LIMIT({LIMIT})) clock_watch (.clk(clk), .oscillation(oscillation), .stopped(stopped));
 ",
         oscillator.runs,
-        stop_time(board).unwrap_or_default(),
+        // takt_clock_watch takes 5 cycles beside its limit.
+        f64::from(LIMIT + 5) / oscillator.runs,
     ))
-}
-
-/// Time in us after which pins are off when the clock stops, by the oscillator's nominal frequency; `None` without an oscillator.
-pub(super) fn stop_time(board: &Board) -> Option<f64> {
-    board.family.oscillator.map(|oscillator| f64::from(LIMIT + 5) / oscillator.runs)
 }
 
 /// The module with the device's own oscillator; `None` if the wiring needs none.
