@@ -429,7 +429,7 @@ impl Resolver<'_> {
     ) -> Result<RegisterId, ErrorReported> {
         let operand = Operand { kind: OperandKind::Expr(expr), span };
         let value = match value {
-            // Where the program computes it, an integer has its low 32 bits.
+            // An integer that the program computes has the low 32 bits.
             Value::Int(_) if ty != Type::F && self.context.names_known_index(at, expr) => value.word(),
             value => value,
         };

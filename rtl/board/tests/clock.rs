@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! What a board does when its program, or its clock, stops: the pin for a watchdog, and pins that go off without a clock.
+//! Boards whose program, or clock, stops: the pin for a watchdog, and pins that go off without a clock.
 
 use std::fs;
 use std::path::Path;

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use takt_isa::{MACHINES, Machine};
 use takt_programs::{EXAMPLES, SOURCES, title};
 
-/// What the page knows about an example besides its text.
+/// Data of an example besides the text of its source.
 struct KnownExample {
     name: &'static str,
     /// Title in the menu of examples, where a sentence would not fit.
@@ -23,7 +23,7 @@ struct KnownExample {
     seconds: Option<u32>,
     /// Ports that are plotted first, where these are not outputs with their references.
     plotted: Option<&'static [&'static str]>,
-    /// Its periods solve a problem `A·x = b` each.
+    /// Each period solves a problem `A·x = b`.
     solves: Option<Solves>,
 }
 

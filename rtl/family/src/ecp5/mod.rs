@@ -117,7 +117,7 @@ LOCATE COMP \"serial_out\" SITE \"U1\";
 ",
     ),
     options: &["--lpf-allow-unconstrained"],
-    // As `cargo evidence synth --unit addmul --count` and so on count them (t1, counted the same way, has 5,570 LUT4 and, placed, 5,741).
+    // Counted by `cargo evidence synth --unit addmul --count` and so on (t1, counted the same way, has 5,570 LUT4 and, placed, 5,741).
     units: &[("fused", [1453, 452, 3]), ("addmul", [888, 515, 3]), ("recurrence", [598, 395, 0])],
     // t1 with 32 and 2 output ports, 4 and 0 loops, 16 and 2 entries, and memories and banks of 38 and 25 address bits in all.
     parts: [[3.5, 132.0, 3.4, 12.7], [0.1, 59.0, 0.6, 6.7]],

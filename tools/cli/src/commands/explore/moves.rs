@@ -66,7 +66,7 @@ pub(super) enum Depths {
 }
 
 impl Depths {
-    /// Those of a row.
+    /// Depths of a row.
     pub(super) fn of(row: &RowOwned) -> Depths {
         let registers = row.slots.iter().map(|slot| slot.bank.depth).max().unwrap_or(1);
         Depths::Are(registers, row.inputs.depth)
