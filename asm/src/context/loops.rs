@@ -244,11 +244,6 @@ impl Context {
         self.depends(at, id, Context::is_index_itself)
     }
 
-    /// A name is the index of a loop at run time, or an argument of a macro that depends on such an index.
-    pub(crate) fn is_index(&self, scope: ScopeId, name: NameId) -> bool {
-        self.leads_to(scope, name, Context::is_index_itself)
-    }
-
     fn is_index_itself(&self, scope: ScopeId, name: NameId) -> bool {
         matches!(self.lookup(scope, name), Binding::Index(_))
     }
