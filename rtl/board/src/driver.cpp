@@ -1,7 +1,8 @@
 // Runs a board's top level for a host: the other half of `simulation.rs`.
 //
 // stdin, words of 32 bits, little-endian; one command:
-//   cycles, faults, then for each input pin its level (0, 1), then a count and that many encoders (pin a, pin b, count, difference):
+//   cycles, faults, then for each input pin its level (0, 1), or 2 + n if it is wired to output pin n, whose level it has a cycle later;
+//   then a count and that many encoders (pin a, pin b, count, difference):
 //   in these cycles the encoder goes that far, evenly; then a count and that many bytes, a word each, which follow those not sent yet
 //   on the UART; then a count and that many output pins, each with its edges (1: rises, 2: falls): the run ends with the first cycle in
 //   which one of these comes. The pin OUTPUTS is the board's tick. faults: 1 in so many bits of the UART, in either direction, is turned;
@@ -84,9 +85,13 @@ int main(int argc, char **argv) {
     for (uint32_t cycles; word(cycles);) {
         uint32_t faults, count, value;
         if (!word(faults)) return 1;
+        std::vector<std::pair<CData *, const CData *>> wires;
         for (unsigned i = 0; i < INPUTS; i++) {
-            if (!word(value)) return 1;
-            *inputs[i] = value;
+            if (!word(value) || value >= 2 + OUTPUTS) return 1;
+            if (value < 2)
+                *inputs[i] = value;
+            else
+                wires.push_back({inputs[i], outputs[value - 2]});
         }
         std::vector<Encoder> encoders;
         if (!word(count)) return 1;
@@ -126,6 +131,7 @@ int main(int argc, char **argv) {
                 *inputs[e.a] = (at + 1) >> 1 & 1;
                 *inputs[e.b] = at >> 1 & 1;
             }
+            for (const auto &wire : wires) *wire.first = *wire.second;
             if (bits == 0 && !sends.empty()) {
                 shift = sends.front() << 1 | 1u << 9;
                 sends.pop_front();

@@ -25,6 +25,7 @@ pub mod project;
 pub mod protocol;
 mod safety_watch;
 pub mod scope;
+pub mod selftest;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod serial;
 pub mod simulation;

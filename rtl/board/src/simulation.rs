@@ -123,6 +123,8 @@ pub struct Simulation {
     stdout: ChildStdout,
     inputs: Vec<(String, u32)>,
     outputs: Vec<String>,
+    /// Wires: an input and the output, by number, whose level it has a cycle later.
+    wires: Vec<(usize, usize)>,
     /// Encoders that turn in the next cycles, once.
     pub turns: Vec<EncoderMotion>,
     /// One in this many bits of the UART is inverted, in either direction; 0 for none.
@@ -214,6 +216,7 @@ impl Simulation {
             levels: vec![0; outputs.len()],
             inputs,
             outputs,
+            wires: Vec::new(),
             turns: Vec::new(),
             noise: 0,
             unplugged: false,
@@ -232,7 +235,16 @@ impl Simulation {
 
     /// The inputs by name, each with its level.
     pub fn inputs(&self) -> impl Iterator<Item = (&str, bool)> {
-        self.inputs.iter().map(|(name, level)| (name.as_str(), *level != 0))
+        self.inputs.iter().enumerate().map(|(at, (name, level))| {
+            let wire = self.wires.iter().find(|(input, _)| *input == at);
+            (name.as_str(), wire.map_or(*level, |(_, output)| self.levels[*output]) != 0)
+        })
+    }
+
+    /// Connects an output to an input, by their names in the circuit, from the next cycle on. Names that do not exist have no effect.
+    pub fn wire(&mut self, output: &str, input: &str) {
+        let output = self.outputs.iter().position(|name| name == output);
+        self.wires.extend(self.input(input).zip(output));
     }
 
     /// Names of the outputs, by number.
@@ -288,7 +300,11 @@ impl Simulation {
     /// If the simulation has ended.
     pub fn run_watched(&mut self, cycles: u32, bytes: &[u8], watched: &Watched) -> io::Result<Stop> {
         let mut words = vec![cycles, self.noise];
+        let inputs = words.len();
         words.extend(self.inputs.iter().map(|(_, level)| *level));
+        for (input, output) in &self.wires {
+            words[inputs + input] = 2 + *output as u32;
+        }
         words.push(self.turns.len() as u32);
         for EncoderMotion { pins: [a, b], from, by } in self.turns.drain(..) {
             words.extend([a as u32, b as u32, from as u32, by as u32]);

@@ -16,6 +16,7 @@ mod peripherals;
 mod pins;
 mod project;
 mod scope;
+mod selftest;
 mod sensors;
 mod system;
 mod top;

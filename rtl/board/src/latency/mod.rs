@@ -11,6 +11,7 @@ mod samples;
 
 pub(crate) use peripherals::{Frame, RECEIVED, Window, frame, update, window, window_start};
 pub use pin_path::{Answer, End, Part, PinPath, PinPaths, Sample, Until};
+pub(crate) use ports::to_outputs;
 pub use ports::{ProgramCycles, undivided};
 pub use samples::{Sampling, samples};
 

@@ -64,6 +64,12 @@ impl ProgramCycles {
     }
 }
 
+/// Cycles from the board's tick to the peripherals' new values, of a program that takes `cycles` from its tick to its `wait`: the register
+/// `cycles`.
+pub(crate) fn to_outputs(cycles: u64, reads: u64, writes: u64) -> u64 {
+    ProgramCycles::from(Span { best: cycles, worst: cycles }).to_put(reads, writes).worst
+}
+
 /// Paths of a program, with the periods that states add: inputs and outputs with equal states share a path. Outputs that follow no input
 /// are left out.
 pub(super) fn ways(wiring: &Wiring, program: &Program, cycles: ProgramCycles) -> PinPaths {
