@@ -26,14 +26,11 @@ from takt.mujoco import CLOCK, Controller
 PERIOD, TIME = 0.05, 20.0
 #: Model with weight, length and inertia 1, as in training; the angle is 0 when upright.
 MODEL = """<mujoco><option gravity="0 0 -1" timestep="0.01" integrator="RK4"/>
-<visual><headlight ambient="0.45 0.45 0.45" diffuse="0.2 0.2 0.2"/><global offwidth="960" offheight="720"/></visual>
-<asset><texture name="sky" type="skybox" builtin="gradient" rgb1="0.93 0.95 0.98" rgb2="0.75 0.8 0.87" width="256" height="256"/></asset>
-<worldbody><light pos="1.5 -2.5 3" dir="-0.4 0.7 -0.8" diffuse="0.8 0.8 0.8"/>
-<geom type="plane" pos="0 0 -1.3" size="3 3 0.1" rgba="0.86 0.88 0.91 1" contype="0" conaffinity="0"/>
-<geom type="cylinder" fromto="0 -0.12 0 0 0.12 0" size="0.09" rgba="0.3 0.32 0.36 1" contype="0" conaffinity="0"/>
+<default><geom contype="0" conaffinity="0" rgba="0.3 0.32 0.36 1"/></default>
+<worldbody><geom type="cylinder" fromto="0 -0.12 0 0 0.2 0" size="0.09"/><geom type="cylinder" fromto="0 0.2 0 0 0.2 -1.25" size="0.03"/>
 <body><joint name="hinge" axis="0 1 0" damping="0.05"/><inertial mass="1" pos="0 0 1" diaginertia="1e-6 1e-6 1e-6"/>
-<geom type="capsule" fromto="0 0 0 0 0 1" size="0.03" rgba="0.49 0.68 0.8 1" contype="0" conaffinity="0"/>
-<geom type="sphere" pos="0 0 1" size="0.12" rgba="0.2 0.35 0.55 1" contype="0" conaffinity="0"/></body></worldbody>
+<geom type="capsule" fromto="0 0 0 0 0 1" size="0.03" rgba="0.49 0.68 0.8 1"/>
+<geom type="sphere" pos="0 0 1" size="0.12" rgba="0.2 0.35 0.55 1"/></body></worldbody>
 <actuator><motor name="motor" joint="hinge" ctrlrange="-0.5 0.5" ctrllimited="true"/></actuator></mujoco>"""
 
 model = mujoco.MjModel.from_xml_string(MODEL)
@@ -92,36 +89,27 @@ def row(name: str, result: Swing) -> str:
 
 
 def picture(result: Swing, file: str) -> None:
-    """The swing-up in one picture: the pendulum every half second, the last upright."""
-    import matplotlib.image
+    """The swing-up in one picture: the way of the mass, and the pendulum upright, pale at times before."""
+    import scenes
 
-    data, camera = mujoco.MjData(model), mujoco.MjvCamera()
-    camera.lookat, camera.distance, camera.azimuth, camera.elevation = [0, 0, -0.1], 3.8, 90, -8
     until = round(result.upright() / PERIOD)
-    with mujoco.Renderer(model, 720, 960) as renderer:
-        data.qpos[0] = result.angle[-1]
-        mujoco.mj_forward(model, data)
-        renderer.update_scene(data, camera)
-        for index, angle in enumerate(result.angle[:until:2]):
-            place = [np.sin(angle), 0, np.cos(angle)]
-            share = 2 * index / until
-            mujoco.mjv_initGeom(renderer.scene.geoms[renderer.scene.ngeom], mujoco.mjtGeom.mjGEOM_SPHERE, [0.02 + 0.02 * share, 0, 0], place, np.eye(3).ravel(), [0.9, 0.3, 0.1, 0.25 + 0.75 * share])
-            renderer.scene.ngeom += 1
-        matplotlib.image.imsave(file, renderer.render())
+    scene = scenes.Scene(mujoco.MjSpec.from_string(MODEL), size=2.0, floor=-1.25, target=[0.08, 0, 0], distance=3.2, azimuth=110, elevation=-12)
+    scene.body(result.angle[-1])
+    for share in (0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.9):
+        scene.ghost(result.angle[int(share * until)], 0.2 + 0.3 * share)
+    scene.way([(np.sin(angle), 0, np.cos(angle)) for angle in result.angle[:until]], 0.018)
+    scene.save(file)
 
 
 def plot(results: dict[str, Swing], file: str) -> None:
     import pictures
 
-    figure, axes = pictures.subplots(2, 4.4, sharex=True)
+    cases = {}
     for name, result in results.items():
-        times = PERIOD * np.arange(1, len(result.angle) + 1)
-        axes[0].plot(times, result.distance, label=name)
-        axes[1].plot(times, result.torque)
-    axes[0].set(title="angle from upright, rad", xlim=(0, times[-1]))
-    axes[1].set(xlabel="time, s", title="torque, of the weight's")
-    pictures.legend(figure, axes[0], 2)
-    pictures.save(figure, file)
+        # Without the whole turns that the pendulum has made at the end, when it is upright.
+        cases[name] = (result.angle - 2 * np.pi * np.round(result.angle[-1] / (2 * np.pi)), result.torque)
+    times = PERIOD * np.arange(1, round(TIME / PERIOD) + 1)
+    pictures.compare(file, times, cases, {"angle from upright": "rad", "torque": "of the weight's"})
 
 
 def main(arguments: list[str] | None = None) -> dict[str, Swing]:

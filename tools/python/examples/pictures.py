@@ -12,6 +12,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 #: Width in inches and size of the type in points: on a telephone, 390 pixels wide, the type keeps seven eighths of its size.
 WIDTH, TYPE = 4.6, 8.5
 #: Style of all figures, with the colours of the playground's plots (`COLOURS` in tools/web/page/src/parts.js).
@@ -63,9 +65,28 @@ def subplots(rows: int, height: float, **options: Any) -> tuple[Any, Any]:
     return plt.subplots(rows, 1, figsize=(WIDTH, height), layout="constrained", **options)
 
 
+def compare(file: str, times: Any, cases: dict[str, tuple[Any, ...]], quantities: dict[str, str], limits: dict[int, tuple[float, float]] | None = None) -> None:
+    """Draws each quantity of the first case, and below it how far the others are from it: their own curves would lie over one another.
+
+    A case has an array for each quantity, which is named with its unit; `limits` are those of differences that begin with a peak.
+    """
+    figure, axes = subplots(2 * len(quantities), 3.1 * len(quantities), sharex=True)
+    (first, base), *others = cases.items()
+    for row, (quantity, unit) in enumerate(quantities.items()):
+        axes[2 * row].plot(times, base[row], label=first)
+        axes[2 * row].set_title(f"{quantity}, {unit}")
+        for colour, (name, curves) in enumerate(others, 1):
+            axes[2 * row + 1].plot(times, curves[row] - base[row], color=f"C{colour}", label=name, lw=0.9)
+        axes[2 * row + 1].set(title=f"difference from {first}, {unit}", ylim=(limits or {}).get(row))
+    axes[-1].set(xlabel="time, s", xlim=(0, times[-1]))
+    legend(figure, axes[:2], 2)
+    save(figure, file)
+
+
 def legend(figure: Any, axes: Any, columns: int) -> None:
-    """One legend for all axes, below them, where it covers no curve."""
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=columns)
+    """One legend for all axes, below them, where it covers no curve. It names the lines of `axes`, which may be an array."""
+    lines = [line for axis in np.atleast_1d(axes) for line in axis.get_lines()]
+    figure.legend(lines, [line.get_label() for line in lines], loc="outside lower left", ncols=columns)
 
 
 def save(figure: Any, file: str | Path) -> None:
