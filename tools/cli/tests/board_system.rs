@@ -17,12 +17,19 @@ fn axis() -> String {
 fn a_system_fits_its_board_and_a_circuit_is_written() {
     let folder = Folder::new();
     let text = folder.line(&format!("board check {}", axis())).ok();
-    assert_eq!(
-        text,
-        "ulx3s-85f, profile t1, servo t1, watch t1: 3 peripherals, 3 of the system's ports on pins, a period of 5000 cycles at 50 MHz\n\
-         the cores take about 17700 of 83640 LUT4, 63 of 208 block RAMs, 18 of 156 multipliers of the LFE5U-85F (estimated); \
-         `takt board build` counts all cells\n"
+    assert!(
+        text.starts_with(
+            "ulx3s-85f, profile t1, servo t1, watch t1: 3 peripherals, 3 of the system's ports on pins, \
+             a period of 5000 cycles at 50 MHz\nthe cores take about "
+        ) && text.ends_with(
+            " of 83640 LUT4, 63 of 208 block RAMs, 18 of 156 multipliers of the LFE5U-85F (estimated); \
+             `takt board build` counts all cells\n"
+        ),
+        "{text}"
     );
+    // The estimate of LUTs follows the fit, which each new synthesis moves: three cores t1 are 15,000 to 20,000.
+    let luts = text.split("take about ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+    assert!((15_000..20_000).contains(&luts.parse::<u32>().unwrap()), "{text}");
     folder.line(&format!("board build {} --sources -o out", axis())).ok();
     assert!(folder.read_text("out/takt_system_board.v").contains("module takt_system_board"));
     assert!(folder.read_text("out/pins.lpf").contains("LOCATE COMP \"encoder_a\" SITE \"B11\";"));
