@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! TextMate grammar, generated from the tables: syntax colours before the server answers, or without a server.
+//! TextMate grammar, Vim syntax and words for Emacs, generated from the tables: syntax colours before the server answers, or without one.
 
 use serde_json::{Value, json};
 use takt_asm::Directive;
@@ -49,4 +49,76 @@ pub fn textmate() -> Value {
 pub fn textmate_text() -> String {
     // Cannot fail: the value consists of literals and strings.
     serde_json::to_string_pretty(&textmate()).unwrap_or_default() + "\n"
+}
+
+/// Words of the language by kind, in the order of the tables.
+struct Words {
+    directives: Vec<&'static str>,
+    mnemonics: Vec<&'static str>,
+    functions: Vec<&'static str>,
+    /// Names of built-in constants; those of one letter are left out, since most programs call a register so.
+    constants: Vec<&'static str>,
+}
+
+impl Words {
+    fn of_the_tables() -> Words {
+        Words {
+            directives: Directive::ALL.iter().map(|directive| directive.name()).collect(),
+            mnemonics: ROWS.iter().map(|row| row.mnemonic).collect(),
+            functions: Function::ALL.iter().map(|function| function.name()).collect(),
+            constants: BUILTINS.iter().map(|builtin| builtin.0).filter(|name| name.len() > 1).collect(),
+        }
+    }
+}
+
+/// Syntax file for Vim and Neovim.
+pub fn vim() -> String {
+    let Words { directives, mnemonics, functions, constants } = Words::of_the_tables();
+    let [directives, mnemonics, functions, constants] =
+        [directives, mnemonics, functions, constants].map(|words| words.join(" "));
+    format!(
+        r#"" Takt in Vim and Neovim. Generated from the tables by `cargo xtask docs`; do not edit.
+if exists('b:current_syntax')
+  finish
+endif
+syntax iskeyword @,48-57,_,.
+syntax keyword taktDirective {directives}
+syntax keyword taktMnemonic {mnemonics}
+syntax keyword taktFunction {functions}
+syntax keyword taktConstant {constants}
+syntax match taktNumber /\v[0-9A-Za-z_.}}]@1<!(0[xX]\x[0-9a-fA-F_]*|0[bB][01][01_]*|\d[0-9_]*(\.[0-9_]*)?([eE][-+]?\d+)?|\.\d[0-9_]*([eE][-+]?\d+)?)/
+syntax match taktLabel /^\s*[A-Za-z_][A-Za-z0-9_.{{}}]*\ze:/
+syntax match taktFile /\(\.include\s*\)\@<=<[^>]*>/
+syntax region taktText start=/"/ skip=/\\./ end=/"/ oneline
+syntax match taktComment /;.*$/ contains=@Spell
+highlight default link taktDirective PreProc
+highlight default link taktMnemonic Statement
+highlight default link taktFunction Function
+highlight default link taktConstant Constant
+highlight default link taktNumber Number
+highlight default link taktLabel Label
+highlight default link taktFile String
+highlight default link taktText String
+highlight default link taktComment Comment
+let b:current_syntax = 'takt'
+"#
+    )
+}
+
+/// Words for the colours of Emacs' `takt-mode`.
+pub fn emacs() -> String {
+    let Words { directives, mnemonics, functions, constants } = Words::of_the_tables();
+    let list = |name: &str, text: &str, words: Vec<&str>| {
+        let words: Vec<String> = words.iter().map(|word| format!("{word:?}")).collect();
+        format!("(defconst takt-{name}\n  '({})\n  \"{text}\")\n\n", words.join(" "))
+    };
+    format!(
+        ";;; takt-words.el --- Words of Takt's sources  -*- lexical-binding: t -*-\n\n\
+         ;; Generated from the tables by `cargo xtask docs'; do not edit.\n\n;;; Code:\n\n{}{}{}{}\
+         (provide 'takt-words)\n;;; takt-words.el ends here\n",
+        list("directives", "Directives.", directives),
+        list("mnemonics", "Names of instructions.", mnemonics),
+        list("functions", "Functions in equations.", functions),
+        list("constants", "Names of constants.", constants),
+    )
 }

@@ -1,11 +1,13 @@
 ;;; takt.el --- Takt in Emacs  -*- lexical-binding: t -*-
 
-;; Put this file into a folder of `load-path', and (require 'takt) into init.el. The language server is used by lsp-mode
-;; or Eglot (29 has it), the debugger by dap-mode: whichever is installed.
+;; Put this file and takt-words.el into a folder of `load-path', and (require 'takt) into init.el. The language server is used by
+;; lsp-mode or Eglot (29 has it), the debugger by dap-mode: whichever is installed.
 
 ;;; Code:
 
 (require 'prog-mode)
+;; From the folder of this file, which need not be in `load-path'.
+(require 'takt-words (expand-file-name "takt-words" (file-name-directory (or load-file-name buffer-file-name))))
 
 (defgroup takt nil "Robot controllers on a processor whose every cycle is accounted for." :group 'languages)
 
@@ -23,11 +25,22 @@
     (modify-syntax-entry ?_ "_" table)
     table))
 
+(defvar takt-font-lock-keywords
+  `(("\\.include[ \t]*\\(<[^>\n]*>\\)" 1 font-lock-string-face)
+    ("^[ \t]*\\([[:alpha:]_][[:alnum:]_.{}]*\\):" 1 font-lock-constant-face)
+    (,(regexp-opt takt-directives 'symbols) . font-lock-preprocessor-face)
+    (,(regexp-opt takt-mnemonics 'symbols) . font-lock-keyword-face)
+    (,(concat (regexp-opt takt-functions 'symbols) "(") 1 font-lock-builtin-face)
+    (,(regexp-opt takt-constants 'symbols) . font-lock-constant-face)
+    ("\\_<\\(?:0[xX][[:xdigit:]_]+\\|0[bB][01_]+\\|[0-9][0-9_]*\\(?:\\.[0-9_]*\\)?\\(?:[eE][-+]?[0-9]+\\)?\\)\\_>" . font-lock-constant-face))
+  "Colours of Takt's sources.")
+
 ;;;###autoload
 (define-derived-mode takt-mode prog-mode "Takt"
-  "Sources of Takt. Colours come from the language server, as semantic tokens."
+  "Sources of Takt. The language server adds colours, as semantic tokens."
   (setq-local comment-start "; ")
   (setq-local comment-start-skip ";+ *")
+  (setq-local font-lock-defaults '(takt-font-lock-keywords))
   (setq-local tab-width 8)
   (setq-local indent-tabs-mode nil)
   (setq-local indent-line-function #'indent-relative-first-indent-point))

@@ -20,7 +20,7 @@ fn capacities() -> String {
 }
 
 /// Generated files: path relative to the project's folder, and contents.
-fn generated() -> [(&'static str, String); 7] {
+fn generated() -> [(&'static str, String); 9] {
     [
         ("docs/isa.md", takt_isa::manual::markdown()),
         ("docs/what-fits.md", capacities()),
@@ -29,6 +29,8 @@ fn generated() -> [(&'static str, String); 7] {
         ("tools/editors/tree-sitter-takt/queries/highlights.scm", takt_editor::tree_sitter::highlights()),
         ("tools/editors/helix/queries/takt/highlights.scm", takt_editor::tree_sitter::helix_highlights()),
         ("tools/editors/tree-sitter-takt/queries/folds.scm", takt_editor::tree_sitter::folds()),
+        ("tools/editors/neovim/syntax/takt.vim", takt_editor::grammar::vim()),
+        ("tools/editors/emacs/takt-words.el", takt_editor::grammar::emacs()),
     ]
 }
 

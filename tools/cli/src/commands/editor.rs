@@ -9,8 +9,10 @@ use std::io::{IsTerminal, Write, stdin, stdout};
 use std::path::{Path, PathBuf};
 
 const NEOVIM: &str = include_str!("../../../editors/neovim/takt.lua");
+const NEOVIM_SYNTAX: &str = include_str!("../../../editors/neovim/syntax/takt.vim");
 const HELIX: &str = include_str!("../../../editors/helix/languages.toml");
 const EMACS: &str = include_str!("../../../editors/emacs/takt.el");
+const EMACS_WORDS: &str = include_str!("../../../editors/emacs/takt-words.el");
 /// Line that makes Emacs load the file beside its `init.el`.
 const LOAD: &str = "(load (expand-file-name \"takt\" user-emacs-directory))\n";
 
@@ -85,8 +87,11 @@ fn helix() -> String {
 fn changes(kind: Kind, home: &Path, config: &Path) -> (Vec<Change>, &'static str) {
     match kind {
         Kind::Neovim => (
-            vec![Change::own(config.join("nvim/plugin/takt.lua"), NEOVIM)],
-            "Neovim starts `takt lsp` in Takt's sources; docs/editors.md has the parser for colours by tree-sitter.\n\
+            vec![
+                Change::own(config.join("nvim/plugin/takt.lua"), NEOVIM),
+                Change::own(config.join("nvim/syntax/takt.vim"), NEOVIM_SYNTAX),
+            ],
+            "Neovim colours Takt's sources, and starts `takt lsp` in them; docs/editors.md has the parser for folds by tree-sitter.\n\
              Next: `nvim programs/examples/pi.s`, or a source of yours.",
         ),
         Kind::Helix => (
@@ -107,7 +112,11 @@ fn changes(kind: Kind, home: &Path, config: &Path) -> (Vec<Change>, &'static str
                 mark: Some(LOAD.trim_ascii_end()),
             };
             (
-                vec![Change::own(folder.join("takt.el"), EMACS), init],
+                vec![
+                    Change::own(folder.join("takt.el"), EMACS),
+                    Change::own(folder.join("takt-words.el"), EMACS_WORDS),
+                    init,
+                ],
                 "`M-x eglot` or `M-x lsp` starts `takt lsp` in a source.\n\
                  Next: `emacs programs/examples/pi.s`, or a source of yours; there `M-x eglot` or `M-x lsp`.",
             )

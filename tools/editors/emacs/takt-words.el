@@ -1,0 +1,24 @@
+;;; takt-words.el --- Words of Takt's sources  -*- lexical-binding: t -*-
+
+;; Generated from the tables by `cargo xtask docs'; do not edit.
+
+;;; Code:
+
+(defconst takt-directives
+  '(".machine" ".reg" ".state" ".input" ".output" ".array" ".const" ".param" ".preset" ".once" ".period" ".data" ".float" ".word" ".space" ".macro" ".endm" ".rep" ".endr" ".for" ".endfor" ".if" ".elif" ".else" ".endif" ".include" ".loc" ".error" ".schedule" ".contract" ".fast" ".ports" ".loop_bound" ".range" ".result" ".assume" ".deadline" ".order" ".late" ".raw")
+  "Directives.")
+
+(defconst takt-mnemonics
+  '("nop" "jmp" "bz" "bnz" "call" "ret" "wait" "halt" "loop" "publish" "ld" "st" "mov" "li" "iadd" "isub" "iand" "ior" "ixor" "ishl" "ishr" "isar" "ieq" "ilt" "iltu" "sel" "rdflags" "clrflags" "fabs" "fneg" "fsign" "fmin" "fmax" "fsat" "feq" "flt" "fle" "fadd" "fsub" "itof" "ftoi" "fmul" "fdiv" "fsqrt" "imul24" "fma" "fms" "fnma" "fnms" "fsin" "fcos" "fatan2" "facos")
+  "Names of instructions.")
+
+(defconst takt-functions
+  '("sqrt" "sin" "cos" "tan" "atan2" "asin" "acos" "exp" "log" "abs" "min" "max" "floor" "ceil" "round" "int" "float" "xor" "bits")
+  "Functions in equations.")
+
+(defconst takt-constants
+  '("pi" "PI" "inf" "nan")
+  "Names of constants.")
+
+(provide 'takt-words)
+;;; takt-words.el ends here
