@@ -2,6 +2,7 @@
 //! Files that are neither source nor image, recognised by their names and first bytes, so that one error says so instead of hundreds about
 //! their lines.
 
+use crate::Directive;
 use crate::expand::load::is_source;
 
 /// Kinds of files: extensions, name of the kind, and the command that takes such a file, `{}` being its name.
@@ -30,21 +31,57 @@ const BEGINNINGS: &[(&[u8], &str)] = &[
     (b"<", "XML or HTML"),
 ];
 
-/// Says what a file seems to be that is neither source nor image, and what to do; `None` if it may be a source.
-pub fn foreign(name: &str, bytes: &[u8]) -> Option<String> {
+/// Directives of GNU's assembler that Takt lacks, with which its sources begin.
+const GNU: [&str; 9] = [
+    ".text",
+    ".globl",
+    ".global",
+    ".section",
+    ".type",
+    ".cfi_startproc",
+    ".intel_syntax",
+    ".syntax",
+    ".option",
+];
+
+/// A source that is GNU assembly for another processor: it has one of [`GNU`], and no directive that only Takt has.
+fn is_gnu(bytes: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(bytes);
+    let mut words =
+        text.lines().filter_map(|line| line.split_whitespace().next()).filter(|word| word.starts_with('.'));
+    let own = [
+        Directive::Period,
+        Directive::Once,
+        Directive::Input,
+        Directive::Output,
+        Directive::Reg,
+        Directive::Schedule,
+    ];
+    words.clone().any(|word| GNU.contains(&word))
+        && !words.any(|word| own.iter().any(|own| own.name() == word))
+}
+
+/// Kind of a file that is neither source nor image, and the command that takes it, `{}` being its name; `None` if it may be a source.
+pub(crate) fn kind(name: &str, bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     let extension = name.rsplit_once('.').map(|(_, extension)| extension.to_ascii_lowercase());
     let by_name = KINDS
         .iter()
         .find(|(endings, ..)| extension.as_deref().is_some_and(|extension| endings.contains(&extension)));
-    let (kind, command) = match by_name {
-        Some((_, kind, command)) => (*kind, *command),
+    match by_name {
+        Some((_, kind, command)) => Some((kind, command)),
+        None if is_source(name) => is_gnu(bytes).then_some(("GNU assembly for another processor", "")),
         None => {
             let beginning = BEGINNINGS.iter().find(|(first, _)| bytes.starts_with(first));
             // The assembler has better words for a source with a byte that is none of a text.
-            let is_binary = !is_source(name) && bytes.contains(&0);
-            (beginning.map(|(_, kind)| *kind).or(is_binary.then_some("binary data"))?, "")
+            let is_binary = bytes.contains(&0);
+            Some((beginning.map(|(_, kind)| *kind).or(is_binary.then_some("binary data"))?, ""))
         }
-    };
+    }
+}
+
+/// Says what a file seems to be that is neither source nor image, and what to do; `None` if it may be a source.
+pub fn foreign(name: &str, bytes: &[u8]) -> Option<String> {
+    let (kind, command) = kind(name, bytes)?;
     let command = command.replace("{}", name);
     let then = if command.is_empty() { command } else { format!("; {command}") };
     Some(format!(
@@ -67,13 +104,19 @@ mod tests {
         assert!(of("prog", b"PK\x03\x04").contains("a ZIP archive"));
         assert!(of("standard input", b"<robot>").contains("XML"));
         assert!(of("prog", b"ab\0c").contains("binary data"));
+        assert!(of("a.s", b"\t.text\n\t.globl f\nf:\tret\n").contains("GNU assembly"));
     }
 
     #[test]
     fn a_source_is_left_to_the_assembler() {
-        for (name, bytes) in
-            [("a.s", &b"\0\0"[..]), ("a.tks", b"nop"), ("a.txt", b"nop"), ("-", b"; a"), ("a.s", b"")]
-        {
+        for (name, bytes) in [
+            ("a.s", &b"\0\0"[..]),
+            ("a.s", b".text\n.period\n"),
+            ("a.tks", b"nop"),
+            ("a.txt", b"nop"),
+            ("-", b"; a"),
+            ("a.s", b""),
+        ] {
             assert_eq!(foreign(name, bytes), None, "{name}");
         }
     }

@@ -133,6 +133,17 @@ impl Diagnostic {
         self
     }
 
+    /// Suggests the names that are equally similar to a misspelt name; a single one replaces it.
+    pub fn did_you_mean_one_of(self, names: &[&str]) -> Diagnostic {
+        match names {
+            [] | [_] => self.did_you_mean(names.first().map(|name| (*name).to_owned())),
+            [init @ .., last] => {
+                let init: Vec<String> = init.iter().map(|name| format!("`{name}`")).collect();
+                self.help(format!("did you mean {} or `{last}`?", init.join(", ")))
+            }
+        }
+    }
+
     fn span(&self) -> Span {
         self.labels.first().map_or(Span::default(), |label| label.span)
     }

@@ -17,6 +17,6 @@ pub use describe::describe;
 pub use diag::{Diagnostic, Diagnostics, Severity, Sink};
 pub use levels::Levels;
 pub use machine::machine;
-pub use nearest::nearest;
+pub use nearest::{all_nearest, nearest};
 pub use source::{Lines, Sources, Span};
 pub use toml_mistake::toml_mistake;

@@ -2,19 +2,25 @@
 //! The known name nearest to a misspelt one.
 
 use crate::limits;
+use std::cmp::Ordering;
 
 /// The candidate most like a misspelt name, if one is near enough to be meant.
 pub fn nearest<'n>(name: &str, candidates: impl IntoIterator<Item = &'n str>) -> Option<String> {
+    all_nearest(name, candidates).first().map(|nearest| (*nearest).to_owned())
+}
+
+/// All candidates that are similar enough to be the intended name and equally near to it, in their order.
+pub fn all_nearest<'n>(name: &str, candidates: impl IntoIterator<Item = &'n str>) -> Vec<&'n str> {
     let length = name.chars().count();
     let allowed = match length {
-        0 => return None,
+        0 => return Vec::new(),
         // Comparison takes quadratic time, and long names are seldom typed.
-        length if length > limits::COMPARED_CHARACTERS => return None,
+        length if length > limits::COMPARED_CHARACTERS => return Vec::new(),
         1..=4 => 1,
         5..=8 => 2,
         _ => 3,
     };
-    let mut best: Option<(usize, &str)> = None;
+    let mut best: (usize, Vec<&str>) = (usize::MAX, Vec::new());
     for candidate in candidates {
         if candidate.len().abs_diff(name.len()) > allowed || candidate == name {
             continue;
@@ -28,11 +34,13 @@ pub fn nearest<'n>(name: &str, candidates: impl IntoIterator<Item = &'n str>) ->
         if distance > allowed || (distance > 0 && distance * 2 > length && !same_start) {
             continue;
         }
-        if best.is_none_or(|(least, _)| distance < least) {
-            best = Some((distance, candidate));
+        match distance.cmp(&best.0) {
+            Ordering::Less => best = (distance, vec![candidate]),
+            Ordering::Equal if !best.1.contains(&candidate) => best.1.push(candidate),
+            _ => {}
         }
     }
-    best.map(|(_, candidate)| candidate.to_owned())
+    best.1
 }
 
 #[cfg(test)]
@@ -48,6 +56,7 @@ mod tests {
         assert_eq!(nearest("qperv").as_deref(), Some("qprev"));
         assert_eq!(nearest("perod").as_deref(), Some("period"));
         assert_eq!(nearest("z"), None);
+        assert_eq!(all_nearest("qsub", ["fsub", "fadd", "isub"]), ["fsub", "isub"]);
         assert_eq!(nearest("completely_different"), None);
     }
 }

@@ -4,6 +4,7 @@
 use crate::context::{AstPlace, ErrorReported};
 use crate::expand::load::{IncludePath, LoadError, Loader, include_path};
 use crate::expand::{Expander, FrameKind};
+use crate::foreign;
 use crate::limits;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -30,6 +31,8 @@ pub(crate) enum FileError {
         limits::SOURCE_BYTES
     )]
     TooMuch,
+    #[error("it seems to be {0}, and no source")]
+    Foreign(&'static str),
     #[error(
         "it is not UTF-8 text: byte 0x{byte:02x} at offset {offset} (line {line}, byte {column} of the line)"
     )]
@@ -79,6 +82,12 @@ impl Expander<'_> {
                 Arc::new(text_of(bytes)?)
             }
         };
+        // The command that reads the program has looked at its first file.
+        if !self.frames.is_empty()
+            && let Some((kind, _)) = foreign::kind(&id.path, text.as_bytes())
+        {
+            return Err(FileError::Foreign(kind));
+        }
         let file = self.context.reports.sources.add_shared(&name, text).ok_or(FileError::TooMuch)?;
         let source = self.context.reports.sources.files()[file].clone();
         let ast = parse::parse(&source, self.context.scopes.names_mut(), &mut self.context.reports.sink);

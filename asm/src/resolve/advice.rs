@@ -5,8 +5,8 @@
 use crate::context::{AstPlace, ErrorReported};
 use crate::expand::load::Loader;
 use crate::resolve::{Host, Resolver};
+use takt_diagnostics::all_nearest;
 use takt_diagnostics::diag::Diagnostic;
-use takt_diagnostics::nearest;
 use takt_diagnostics::source::{Span, line_feeds};
 use takt_isa::{Effect, Op, ROWS, Row};
 use takt_syntax::ast::*;
@@ -97,7 +97,10 @@ impl Resolver<'_> {
                 self.context.scopes.macros.keys().map(|name| self.context.scopes.text(*name)).collect();
             let mut known: Vec<&str> = ROWS.iter().map(|row| row.mnemonic).chain(macros).collect();
             known[ROWS.len()..].sort_unstable();
-            error.did_you_mean(alias(&lower).map(str::to_owned).or_else(|| nearest(&text, known)))
+            match alias(&lower) {
+                Some(own) => error.did_you_mean(Some(own.to_owned())),
+                None => error.did_you_mean_one_of(&all_nearest(&text, known)),
+            }
         };
         self.context.report(at.scope, error)
     }
