@@ -6,6 +6,7 @@
 //! - [`bound`]: best-case and worst-case execution time of each section of a program, by static analysis.
 //! - [`dependence`]: data-flow analysis of the number of periods after which an output follows an input.
 //! - [`what_if`]: the effect of faster units.
+//! - [`limit()`]: the limit that saturates an output port.
 //! - [`period`]: a run up to the period under examination.
 //! - [`static_issue()`]: the cycle in which each bundle of straight-line code issues, and its stalls.
 //! - [`trace`]: every issue of a period, its stalls, the critical path, and the effect of a faster unit.
@@ -17,6 +18,7 @@ mod chain;
 pub mod dependence;
 mod error;
 mod graph;
+mod limit;
 pub mod period;
 pub mod picture;
 mod static_issue;
@@ -28,5 +30,6 @@ pub mod what_if;
 pub use bound::{Bounds, Publication, SectionBounds, bound, section_cycles};
 pub use chain::{EdgeSlots, Loop};
 pub use error::{BoundError, Refusal};
+pub use limit::limit;
 pub use static_issue::{StaticIssue, static_issue};
 pub use trace::{IssuedBundle, Link, LinkKind, MAX_ISSUES, Stalls, Trace, TraceError, WhatIf, trace};

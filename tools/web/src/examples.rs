@@ -53,13 +53,13 @@ const CONTROL: KnownExample =
     KnownExample { plant: Some("pmsm"), periods: Some(320), plotted: Some(CURRENTS), ..PLAIN };
 const MOTOR: KnownExample = KnownExample { plant: Some("dc_motor"), periods: Some(400), ..PLAIN };
 
-/// Examples in the order of the menu.
+/// Examples in the order of the menu; the page opens on the first, which is the README's.
 #[rustfmt::skip]
 const KNOWN: [KnownExample; 12] = [
-    KnownExample { name: "pi.s", short: "motor speed, PI",
-        text: "For makers of speed controllers. Try KP at 0.3, and the speed overshoots; at 1.6, it arrives too late.", ..MOTOR },
     KnownExample { name: "gains.s", short: "motor speed, equations",
-        text: "For those who tune while the motor turns. Try \"set from period\" 200, then drag kp: the run changes from there on.", ..MOTOR },
+        text: "For makers of speed controllers. Try ki at 20, and the speed overshoots; with \"set from period\" 200, only from there on.", ..MOTOR },
+    KnownExample { name: "pi.s", short: "motor speed, PI",
+        text: "For those whose gains are fixed. Try KP at 0.3, and the speed overshoots; at 1.6, it arrives too late.", ..MOTOR },
     KnownExample { name: "tracking.s", short: "five-axis robot",
         text: "For makers of robots. Try the tab Robot, where it follows its path, and the tab Pipeline, with each cycle of a period.", seconds: Some(3), ..PLAIN },
     KnownExample { name: "pendulum.s", short: "pendulum on a cart",

@@ -29,7 +29,6 @@ mod export;
 mod exports;
 mod language;
 mod plant;
-mod ports;
 mod program;
 mod run;
 mod track;

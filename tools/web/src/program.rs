@@ -3,7 +3,7 @@
 
 use crate::plant::PlantRequest;
 use crate::run::{ZERO_PERIODS, number, prepare};
-use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, constants, examples, plant, ports, view};
+use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, constants, examples, plant, view};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, HashMap};
@@ -299,7 +299,7 @@ fn facts(loaded: &LoadedProgram) -> Value {
     let port = |port: &Port, what: &str| {
         json!({
             "name": port.name, "type": port.ty.name(), "unit": units::unit(&sources, what, &port.name),
-            "limit": ports::limit(program, port.register),
+            "limit": takt_analysis::limit(program, port.register),
             "together": units::declared_together(&sources, what, &port.name),
         })
     };

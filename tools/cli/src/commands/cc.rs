@@ -58,8 +58,8 @@ pub(crate) struct Cc {
 
 const EXAMPLES: &str = "\
 Examples:
-  takt cc pid.c --step pid_step --init pid_init -o pid.s
-  takt bound pid.s                                  what it makes is a program
+  takt cc programs/examples/c/speed.c --step speed_step --init speed_init -o speed.s
+  takt bound speed.s                                the file is a program like any other
   takt cc fir.c --step fir --set n=16 -o fir.s      a parameter that is the same in every period
   takt cc pid.c --list                              which functions can be the step
   takt cc foc.c math.c --step foc --double=float -I inc -DNDEBUG -o foc.s";

@@ -551,7 +551,7 @@ fn errors(calibration: &[Calibration], out: &mut Out) -> Result<()> {
     for Calibration { machine, luts, mhz } in calibration {
         writeln!(
             out,
-            "  {machine}: LUT4 {}, clock {}; without {machine} in the fit {} and {}",
+            "  {machine}: LUT4 {}, clock {}; estimated from the other machines alone, {} and {}",
             off(luts[0], luts[1]),
             off(mhz[0], mhz[1]),
             off(luts[0], luts[2]),

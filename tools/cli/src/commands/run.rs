@@ -201,7 +201,9 @@ impl Run {
                     let (mut titles, mut units): (Vec<_>, Vec<_>) = run.further_curves().into_iter().unzip();
                     titles.extend(run.titles());
                     units.extend(run.units());
-                    RefCell::new(Curves::new(titles, run.period()).with_units(units))
+                    RefCell::new(
+                        Curves::new(titles, run.period()).with_units(units).with_limits(run.limits()),
+                    )
                 });
                 let tables = Tables { inputs, outputs, curves: curves.as_ref(), most: self.periods };
                 let result = tables.drive(&mut run);
@@ -328,6 +330,13 @@ impl TableApplication for ProgramRun<'_, '_> {
         let Some(plant) = &self.plant else { return outputs.collect() };
         let inputs = self.units_of(".input", &self.program.inputs).into_iter();
         inputs.chain(outputs).chain(plant.state_units()).collect()
+    }
+
+    fn limits(&self) -> Vec<(String, f64)> {
+        let limit = |port: &Port| {
+            Some((port.name.clone(), takt_analysis::limit(self.program, port.register)?.into()))
+        };
+        self.program.outputs.iter().filter_map(limit).collect()
     }
 
     fn inputs(&self) -> Vec<Port> {

@@ -35,6 +35,11 @@ pub(crate) trait TableApplication {
         Vec::new()
     }
 
+    /// Limits that saturate columns of the output table, by the columns' names.
+    fn limits(&self) -> Vec<(String, f64)> {
+        Vec::new()
+    }
+
     /// Columns of the curves that the output table lacks, and their units: they come before it.
     fn further_curves(&self) -> Vec<(String, Option<String>)> {
         Vec::new()

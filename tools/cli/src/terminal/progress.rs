@@ -38,10 +38,13 @@ pub(crate) fn progress(count: u64, what: &str, quiet: bool) -> ProgressBar {
     bar
 }
 
-/// Estimated remaining time, once known.
+/// Estimated remaining time, once a tenth of the items is done: from the time that they took on average, since items differ, and an
+/// estimate from the last ones jumps.
 fn to_go(state: &ProgressState, out: &mut dyn fmt::Write) {
-    if state.pos() > 0 {
-        let _ = write!(out, ", {:#} to go", HumanDuration(state.eta()));
+    let (done, all) = (state.pos(), state.len().unwrap_or_default());
+    if done > 0 && done * 10 >= all {
+        let left = state.elapsed().mul_f64(all.saturating_sub(done) as f64 / done as f64);
+        let _ = write!(out, ", {:#} to go", HumanDuration(left));
     }
 }
 

@@ -33,8 +33,8 @@ afterEach(async () => {
   for (const context of contexts.splice(0)) await context.close();
 });
 
-/** Opens a new page with a URL fragment; errors in the page's code fail the test. */
-async function open(fragment = "", { script, ...options } = {}) {
+/** Opens a new page with a URL fragment; "" is the page as a stranger opens it. Errors in the page's code fail the test. */
+async function open(fragment = "#example=pi.s", { script, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, acceptDownloads: true, ...options });
   contexts.push(context);
   const page = await context.newPage();
@@ -521,7 +521,7 @@ test("before a script has run, the menus say what opens first, and nothing can b
   const page = await (await browser.newContext({ javaScriptEnabled: false })).newPage();
   contexts.push(page.context());
   await page.goto(address);
-  assert.deepEqual([await page.textContent("#example"), await page.textContent("#machine")], ["pi.s: motor speed, PI", "t3"]);
+  assert.deepEqual([await page.textContent("#example"), await page.textContent("#machine")], ["gains.s: motor speed, equations", "t3"]);
   assert.equal(await page.locator(":is(header, main)[inert]").count(), 2);
 });
 
@@ -1553,9 +1553,9 @@ test("speed of the closed loop", { timeout: 10 * PATIENCE, skip: process.env.TAK
 
 test("nothing comes from elsewhere, and it is small", limit, async () => {
   requests = [];
-  const { page } = await open();
+  const { page } = await open("");
   await done(page);
   // The panels that are imported when they are asked for are none of it; what they share with it is.
   const asked = [...new Set(requests)].map((path) => path.replace(/^\/parts\/chunk-\w+\.js$/, "/parts/chunk")).sort();
-  assert.deepEqual([...new Set(asked)], ["/ahead/pi.s.json.gz", "/index.html", "/main.css", "/main.js", "/parts/chunk", "/takt.wasm.gz", "/worker.js"]);
+  assert.deepEqual([...new Set(asked)], ["/ahead/gains.s.json.gz", "/index.html", "/main.css", "/main.js", "/parts/chunk", "/takt.wasm.gz", "/worker.js"]);
 });

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Columns of a table over time as SVG, a chart for each.
+//! Columns of a table over time as SVG: those of one unit share charts, as on the page.
 
-use super::{CUT, Outcome, POINTS, SIZE, chart, font, in_pixels, mesh, px};
+use super::{Area, Axes, CUT, LIMIT, Outcome, POINTS, SIZE, chart, font, in_pixels, mesh, px};
 use crate::terminal::number::rounded;
 use anyhow::{Result, anyhow};
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Height in pixels of a chart with its names, of the names, and of the title.
 const HEIGHT: u32 = 160;
@@ -14,6 +16,17 @@ const TITLE: u32 = 40;
 const LEFT: u32 = 72;
 /// Relative difference of two columns that are the same but for the rounding to binary32.
 const SAME: f64 = 1e-6;
+/// Most columns of a chart that have nothing in common but their unit, and the largest ratio of their ranges.
+const SHARED: usize = 4;
+const SCALE: f64 = 20.0;
+/// Longest time, in s, whose axis counts milliseconds.
+const BRIEF: f64 = 2.0;
+/// A limit is drawn if a value reaches this fraction of it.
+const NEAR: f64 = 0.4;
+/// Dashes of references and limits, and the line before a name, in pixels.
+const DASH: u32 = 8;
+const GAP: u32 = 5;
+const SAMPLE: u32 = 18;
 /// Most charts; further columns are left out.
 const CHARTS: usize = 40;
 /// Width of a character in a chart's names, in pixels.
@@ -21,8 +34,8 @@ const LABEL: u32 = 8;
 /// Characters of a line of constants, and its height in pixels.
 const LINE: usize = 110;
 const LINE_HEIGHT: u32 = 22;
-/// Colors of a chart's curves: a signal's, and the reference's below it, or an array's elements'; told apart by the colour-blind, too
-/// (Okabe and Ito).
+/// Colors of a chart's signals, or of an array's elements; told apart by the colour-blind, too (Okabe and Ito). A reference has the colour of
+/// its signal, and is dashed.
 const COLORS: [RGBColor; 8] = [
     CUT,
     RGBColor(0xd5, 0x5e, 0x00),
@@ -45,6 +58,8 @@ pub(crate) struct Curves {
     titles: Vec<String>,
     /// Units of the columns, as far as they are known.
     units: Vec<Option<String>>,
+    /// Symmetric limits of columns.
+    limits: Vec<Option<f64>>,
     /// Length of a period in s; without it, the axis counts periods.
     period: Option<f64>,
     /// Periods of a stretch.
@@ -53,19 +68,49 @@ pub(crate) struct Curves {
     stretches: Vec<Stretch>,
 }
 
+/// A column in a chart.
+struct Drawn {
+    column: usize,
+    color: RGBColor,
+    /// The column is the reference of another one in the chart.
+    is_reference: bool,
+}
+
 /// Name of the array of which a name such as `motor.ia[2]` is an element.
 fn array(name: &str) -> Option<&str> {
     name.strip_suffix(']')?.rsplit_once('[').map(|(of, _)| of)
 }
 
+/// Two names are the same but for their last character.
+fn differ_at_the_end(one: &str, other: &str) -> bool {
+    let mut ends = [one.chars(), other.chars()];
+    let last = ends.each_mut().map(|name| name.next_back());
+    let [one, other] = ends.map(|rest| rest.as_str().to_owned());
+    !one.is_empty() && one == other && last[0] != last[1]
+}
+
 impl Curves {
     pub(crate) fn new(titles: Vec<String>, period: Option<f64>) -> Curves {
-        Curves { titles, units: Vec::new(), period, every: 1, rows: 0, stretches: Vec::new() }
+        Curves {
+            titles,
+            units: Vec::new(),
+            limits: Vec::new(),
+            period,
+            every: 1,
+            rows: 0,
+            stretches: Vec::new(),
+        }
     }
 
     /// Gives the columns their units.
     pub(crate) fn with_units(self, units: Vec<Option<String>>) -> Curves {
         Curves { units, ..self }
+    }
+
+    /// Gives columns, by their names, the symmetric limits that saturate them.
+    pub(crate) fn with_limits(self, limits: Vec<(String, f64)>) -> Curves {
+        let limit = |title: &String| limits.iter().find(|(name, _)| name == title).map(|(_, limit)| *limit);
+        Curves { limits: self.titles.iter().map(limit).collect(), ..self }
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -109,18 +154,18 @@ impl Curves {
         all.reduce(|(low, high), (a, b)| (low.min(a), high.max(b)))
     }
 
-    /// Columns of each chart: one, an array's elements, or a signal with the reference that it follows (`id`, or a plant's `motor.id`, and
-    /// `id_ref`).
+    /// The column that follows a reference: `id`, or a plant's `motor.id`, of `id_ref`.
+    fn signal_of(&self, reference: usize) -> Option<usize> {
+        let wanted = self.titles[reference].rsplit('.').next().and_then(|text| text.strip_suffix("_ref"))?;
+        self.titles.iter().position(|name| name.rsplit('.').next() == Some(wanted))
+    }
+
+    /// Columns of each chart, before those of one unit are joined: one, an array's elements, or a signal with its reference.
     fn charts(&self) -> Vec<Vec<usize>> {
         let mut charts: Vec<Vec<usize>> = Vec::new();
         let arrays: Vec<Option<&str>> = self.titles.iter().map(|name| array(name)).collect();
-        let follows = |name: &str, reference: &str| {
-            let signal = name.rsplit('.').next().unwrap_or(name);
-            reference.rsplit('.').next().and_then(|text| text.strip_suffix("_ref")) == Some(signal)
-        };
-        let signal_of = |reference: &str| self.titles.iter().position(|name| follows(name, reference));
-        for (column, name) in self.titles.iter().enumerate() {
-            if signal_of(name).is_some() || self.is_repeated(column) {
+        for column in 0..self.titles.len() {
+            if self.signal_of(column).is_some() || self.is_repeated(column) {
                 continue;
             }
             if let Some(of) = arrays[column] {
@@ -130,7 +175,7 @@ impl Curves {
                 }
                 continue;
             }
-            let reference = self.titles.iter().position(|other| signal_of(other) == Some(column));
+            let reference = (0..arrays.len()).find(|other| self.signal_of(*other) == Some(column));
             charts.push([Some(column), reference].into_iter().flatten().collect());
         }
         charts
@@ -145,19 +190,72 @@ impl Curves {
             let value = self.range(column).map_or_else(|| "no number".to_owned(), |(low, _)| rounded(low, 6));
             format!("{} = {value} {}", self.titles[column], self.unit(&[column])).trim_end().to_owned()
         });
-        (moving, words.collect())
+        let words = words.collect();
+        let mut joined: Vec<Vec<usize>> = Vec::new();
+        for columns in moving {
+            match joined.iter_mut().find(|chart| self.may_join(chart, &columns)) {
+                Some(chart) => chart.extend(columns),
+                None => joined.push(columns),
+            }
+        }
+        (joined, words)
     }
 
-    /// Names above a chart, each in the colour of its curve; of an array, its own name and the indices.
-    fn names(&self, columns: &[usize]) -> Vec<(&str, RGBColor)> {
-        let of = self.array(columns);
-        let name = |column: usize| {
-            let whole = self.titles[column].as_str();
-            let index = whole.rsplit('[').next().map(|index| index.trim_end_matches(']'));
-            index.filter(|_| of.is_some()).unwrap_or(whole)
+    /// Two charts can share an axis: they have the same unit, or none and names such as `da` and `db`, no array, and ranges of one order.
+    fn may_join(&self, one: &[usize], other: &[usize]) -> bool {
+        let span = |columns: &[usize]| self.ends(columns).map_or(0.0, |(low, high)| high - low);
+        let (least, most) = (span(one).min(span(other)), span(one).max(span(other)));
+        let name = |columns: &[usize]| columns.first().map_or("", |column| self.titles[*column].as_str());
+        self.unit(one) == self.unit(other)
+            && (!self.unit(one).is_empty() || differ_at_the_end(name(one), name(other)))
+            && self.array(one).is_none()
+            && self.array(other).is_none()
+            && one.len() + other.len() <= SHARED
+            && most <= SCALE * least
+    }
+
+    /// Least and largest value of a chart's columns.
+    fn ends(&self, columns: &[usize]) -> Option<(f64, f64)> {
+        let ranges = columns.iter().filter_map(|column| self.range(*column));
+        ranges.reduce(|(low, high), (a, b)| (low.min(a), high.max(b)))
+    }
+
+    /// Limits of a chart's columns that their values approach, with a sign.
+    fn limits(&self, columns: &[usize]) -> Vec<f64> {
+        let mut found: Vec<f64> = Vec::new();
+        for column in columns {
+            let Some((limit, (low, high))) =
+                self.limits.get(*column).copied().flatten().zip(self.range(*column))
+            else {
+                continue;
+            };
+            let reached = [(high, limit), (-low, -limit)];
+            let near =
+                reached.into_iter().filter(|(value, _)| *value >= NEAR * limit).map(|(_, limit)| limit);
+            found.extend(near.filter(|limit| !found.contains(limit)).collect::<Vec<_>>());
+        }
+        found
+    }
+
+    /// Columns of a chart with their colours.
+    fn drawn(&self, columns: &[usize]) -> Vec<Drawn> {
+        let signal = |column: usize| self.signal_of(column).filter(|signal| columns.contains(signal));
+        let signals: Vec<usize> =
+            columns.iter().copied().filter(|column| signal(*column).is_none()).collect();
+        let color = |column: usize| {
+            let of = signals.iter().position(|other| *other == signal(column).unwrap_or(column));
+            COLORS[of.unwrap_or_default() % COLORS.len()]
         };
-        let array = of.map(|name| (name, BLACK));
-        array.into_iter().chain(columns.iter().map(|column| name(*column)).zip(COLORS)).collect()
+        let drawn =
+            |&column: &usize| Drawn { column, color: color(column), is_reference: signal(column).is_some() };
+        columns.iter().map(drawn).collect()
+    }
+
+    /// Name of a column above its chart: of an array's element, the index.
+    fn name<'n>(&'n self, columns: &[usize], column: usize) -> &'n str {
+        let whole = self.titles[column].as_str();
+        let index = whole.rsplit('[').next().map(|index| index.trim_end_matches(']'));
+        index.filter(|_| self.array(columns).is_some()).unwrap_or(whole)
     }
 
     /// Name of the array whose elements a chart has.
@@ -222,39 +320,94 @@ impl Curves {
             let place = (px(LINE_HEIGHT) as i32, px(row as u32 * LINE_HEIGHT) as i32);
             foot.draw_text(line, &font(13).into_text_style(&foot), place)?;
         }
-        let time = |stretch: f64| stretch * self.every as f64 * self.period.unwrap_or(1.0);
-        let end = time(self.stretches.len().max(1) as f64);
-        let label = if self.period.is_some() { "time, s" } else { "period" };
+        // Without a length, a period's values stand around the period's number, from 1.
+        let (length, begin, label) = match self.period {
+            Some(period) if self.rows as f64 * period <= BRIEF => (period * 1e3, 0.0, "time, ms"),
+            Some(period) => (period, 0.0, "time, s"),
+            None => (1.0, 0.5, "period"),
+        };
+        let length = length * self.every as f64;
+        let ends: Vec<f64> =
+            (0..=self.stretches.len().max(1)).map(|end| begin + length * end as f64).collect();
         for (number, (columns, area)) in
             charts.iter().zip(rest.split_evenly((charts.len().max(1), 1))).enumerate()
         {
-            let ranges = columns.iter().filter_map(|column| self.range(*column));
-            let (low, high) =
-                ranges.reduce(|(low, high), (a, b)| (low.min(a), high.max(b))).unwrap_or((0.0, 1.0));
-            let margin = if high > low { 0.06 * (high - low) } else { 1.0 };
-            let (names, area) = area.split_vertically(px(NAMES));
-            let mut left = LEFT;
-            for (name, color) in self.names(columns) {
-                let style = font(14).with_color(color).into_text_style(&names);
-                names.draw_text(name, &style, (px(left) as i32, px(2) as i32))?;
-                left += LABEL * (name.chars().count() as u32 + 2);
-            }
-            let mut chart = chart(&area).build_cartesian_2d(0.0..end, low - margin..high + margin)?;
-            mesh(&mut chart, if number + 1 == charts.len() { label } else { "" }, self.unit(columns))?;
-            // The reference lies below.
-            for (column, color) in columns.iter().zip(COLORS).rev() {
-                // Steps, as the values are held; a stretch of many periods has both of its ends.
-                let points = self.stretches.iter().enumerate().filter_map(|(index, stretch)| {
-                    let (low, high) = stretch.ranges.get(*column).copied().flatten()?;
-                    let (from, to) = (time(index as f64), time(index as f64 + 1.0));
-                    Some([(from, low), (from, high), (to, high)])
-                });
-                chart.draw_series(LineSeries::new(points.flatten(), color.stroke_width(px(1))))?;
-            }
+            let label = if number + 1 == charts.len() { label } else { "" };
+            self.draw_chart(columns, &area, &ends, label)?;
         }
         root.present()?;
         Ok(())
     }
+
+    /// Draws a chart; `ends` are the begin of the first stretch and the ends of all.
+    fn draw_chart(&self, columns: &[usize], area: &Area<'_>, ends: &[f64], label: &str) -> Outcome<()> {
+        let limits = self.limits(columns);
+        let (low, high) = self.ends(columns).unwrap_or((0.0, 1.0));
+        let (low, high) =
+            limits.iter().fold((low, high), |(low, high), limit| (low.min(*limit), high.max(*limit)));
+        let margin = if high > low { 0.06 * (high - low) } else { 1.0 };
+        let (begin, end) = (ends[0], ends[ends.len() - 1]);
+        let (names, area) = area.split_vertically(px(NAMES));
+        let drawn = self.drawn(columns);
+        let mut left = LEFT;
+        if let Some(array) = self.array(columns) {
+            names.draw_text(array, &font(14).into_text_style(&names), (px(left) as i32, px(2) as i32))?;
+            left += LABEL * (array.chars().count() as u32 + 2);
+        }
+        for curve in &drawn {
+            let (from, to, middle) = (px(left) as i32, px(left + SAMPLE) as i32, px(NAMES / 2) as i32);
+            let line = vec![(from, middle), (to, middle)];
+            let style = curve.color.stroke_width(px(2));
+            if curve.is_reference {
+                names.draw(&DashedPathElement::new(line, px(DASH), px(GAP), style))?;
+            } else {
+                names.draw(&PathElement::new(line, style))?;
+            }
+            let name = self.name(columns, curve.column);
+            let style = font(14).with_color(curve.color).into_text_style(&names);
+            names.draw_text(name, &style, (px(left + SAMPLE + GAP) as i32, px(2) as i32))?;
+            left += SAMPLE + GAP + LABEL * (name.chars().count() as u32 + 2);
+        }
+        let mut chart = chart(&area).build_cartesian_2d(begin..end, low - margin..high + margin)?;
+        mesh(&mut chart, label, self.unit(columns))?;
+        for limit in limits {
+            let line = [(begin, limit), (end, limit)];
+            dashed(&mut chart, line.into_iter(), LIMIT)?;
+            let text = format!("limit {} {}", rounded(limit, 6), self.unit(columns));
+            let style = font(12).with_color(LIMIT).into_text_style(&area);
+            let style = style.pos(Pos::new(HPos::Right, if limit > 0.0 { VPos::Top } else { VPos::Bottom }));
+            chart.draw_series([Text::new(text.trim_end().to_owned(), (end, limit), style)])?;
+        }
+        // References lie below.
+        let (references, signals): (Vec<&Drawn>, Vec<&Drawn>) =
+            drawn.iter().partition(|curve| curve.is_reference);
+        for curve in references.into_iter().chain(signals.into_iter().rev()) {
+            // Steps, as the values are held; a stretch of many periods has both of its ends.
+            let points = self.stretches.iter().enumerate().filter_map(|(index, stretch)| {
+                let (low, high) = stretch.ranges.get(curve.column).copied().flatten()?;
+                let (from, to) = (ends[index], ends[index + 1]);
+                Some([(from, low), (from, high), (to, high)])
+            });
+            let points = points.flatten();
+            if curve.is_reference {
+                dashed(&mut chart, points, curve.color)?;
+            } else {
+                chart.draw_series(LineSeries::new(points, curve.color.stroke_width(px(1))))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Draws a dashed line.
+fn dashed(
+    chart: &mut ChartContext<'_, SVGBackend<'_>, Axes>,
+    points: impl Iterator<Item = (f64, f64)> + Clone,
+    color: RGBColor,
+) -> Outcome<()> {
+    let series = DashedLineSeries::new(points, px(DASH), px(GAP), color.stroke_width(px(1)));
+    chart.draw_series(series)?;
+    Ok(())
 }
 
 #[cfg(test)]
@@ -281,7 +434,7 @@ mod tests {
         assert!(svg.contains("a &amp; b") && svg.contains("time, s"), "{}", &svg[..300]);
     }
 
-    /// Constant columns take a line of text, and a reference lies below its signal; both have units.
+    /// Constant columns take a line of text, and a reference is drawn with its signal; both have units, and those of one unit share a chart.
     #[test]
     fn constants_are_words_and_references_share_a_chart() {
         let titles = ["id_ref", "motor.id", "tripped", "w_ref", "w"].map(str::to_owned);
@@ -293,7 +446,7 @@ mod tests {
         let units = [Some("A"), Some("A"), Some("V"), Some("rad/s"), Some("rad/s")];
         let curves = curves.with_units(units.map(|unit| unit.map(str::to_owned)).to_vec());
         let svg = curves.draw("loop").unwrap();
-        let texts = ["motor.id", "id_ref", "A", "w", "w_ref", "rad/s", "tripped = 1 V", "time, s"];
+        let texts = ["motor.id", "id_ref", "A", "w", "w_ref", "rad/s", "tripped = 1 V", "time, ms"];
         let missing: Vec<_> = texts.iter().filter(|text| !svg.contains(&format!("\n{text}\n"))).collect();
         assert!(missing.is_empty(), "{missing:?} in {svg}");
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Limits of ports, for the axes of plots.
+//! Limits of output ports: plots show them as lines.
 
 use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex};
 
@@ -7,7 +7,7 @@ use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex};
 const COPIES: usize = 8;
 
 /// Symmetric limit of an output port: the constant limit of the `fsat` that writes it, directly or through copies.
-pub(crate) fn limit(program: &Program, port: Register) -> Option<f32> {
+pub fn limit(program: &Program, port: Register) -> Option<f32> {
     // If several operations write the port, one of them perhaps in `.once`, take the first limit found.
     let writers = writers(program, port);
     writers.iter().find_map(|(address, instruction)| saturated(program, *address, instruction, COPIES))
