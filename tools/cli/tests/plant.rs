@@ -301,23 +301,33 @@ fn a_picture_from_a_table_shows_its_inputs() {
     assert!(folder.read_text("out.csv").starts_with("y,cycles\n"));
 }
 
-/// The picture in docs/examples.md is of its example as it is: TAKT_BLESS=1 draws it.
+/// Pictures in docs/examples.md are of the examples as they are: TAKT_BLESS=1 draws them.
 #[test]
-fn the_picture_of_the_examples_is_fresh() {
+fn the_pictures_of_the_examples_are_fresh() {
     let folder = Folder::new();
-    for (name, file) in [("pi.s", "../pi.s"), ("dc_motor.toml", "dc_motor.toml")] {
-        folder.write(name, std::fs::read_to_string(example().join(file)).unwrap());
+    let programs = example().join("..");
+    let mut stale = Vec::new();
+    for (name, picture, rest) in [
+        ("pi", "pi", "--plant plant/dc_motor.toml --periods 400"),
+        ("pendulum", "cart", "--plant plant/cart_pendulum.toml --periods 6000"),
+        ("biquads", "biquads", "--inputs biquads.csv"),
+        ("table", "table", "--inputs table.csv"),
+    ] {
+        let out = folder.path().join(format!("{picture}.svg"));
+        let line = format!("run {name}.s {rest} --plot {}", out.display());
+        let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
+        command.current_dir(&programs);
+        RunOutput::of(command).ok();
+        let drawn = std::fs::read_to_string(out).unwrap();
+        let path = format!("{}/../../docs/pictures/{picture}.svg", env!("CARGO_MANIFEST_DIR"));
+        if std::env::var_os("TAKT_BLESS").is_some() {
+            std::fs::write(&path, &drawn).unwrap();
+        }
+        if !std::fs::read_to_string(&path).is_ok_and(|old| old == drawn) {
+            stale.push(path);
+        }
     }
-    folder.line("run pi.s --plant dc_motor.toml --periods 400 --plot pi.svg");
-    let drawn = folder.read_text("pi.svg");
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/pictures/pi.svg");
-    if std::env::var_os("TAKT_BLESS").is_some() {
-        std::fs::write(path, &drawn).unwrap();
-    }
-    assert!(
-        std::fs::read_to_string(path).is_ok_and(|old| old == drawn),
-        "{path} is stale: TAKT_BLESS=1 draws it"
-    );
+    assert!(stale.is_empty(), "{stale:?} are stale: TAKT_BLESS=1 draws them");
 }
 
 /// The picture of a loop names its file, has units, and shows a sensor's state once.
@@ -329,6 +339,6 @@ fn the_picture_of_a_loop_has_units() {
     assert!(done.stderr.contains("the curves are in loop.svg"), "{done:?}");
     let svg = folder.read_text("loop.svg");
     let has = |text: &str| svg.contains(&format!("\n{text}\n"));
-    assert!(["rad/s", "V", "A", "rad", "time, s", "w_ref", "w", "dc_motor.i"].into_iter().all(has), "{svg}");
+    assert!(["rad/s", "V", "A", "rad", "time, ms", "w_ref", "w", "dc_motor.i"].into_iter().all(has), "{svg}");
     assert!(!has("dc_motor.w"), "{svg}");
 }

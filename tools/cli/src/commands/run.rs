@@ -211,7 +211,10 @@ impl Run {
                 if let (Some(path), Some(curves)) =
                     (&self.plot, curves.filter(|curves| !curves.borrow().is_empty()))
                 {
-                    files::write(path, curves.into_inner().draw(&files::input_name(&self.file))?.as_bytes())?;
+                    let name = self.file.file_name().filter(|_| !files::is_dash(&self.file));
+                    let title =
+                        name.map_or_else(|| files::input_name(&self.file), |name| name.display().to_string());
+                    files::write(path, curves.into_inner().draw(&title)?.as_bytes())?;
                     if !files::is_dash(path) {
                         message(&format!("the curves are in {}", path.display()));
                     }

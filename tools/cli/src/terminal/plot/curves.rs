@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Columns of a table over time as SVG: those of one unit share charts, as on the page.
 
-use super::{Area, Axes, CUT, LIMIT, Outcome, POINTS, SIZE, chart, font, in_pixels, mesh, px};
+use super::{Area, Axes, CUT, LIMIT, Outcome, chart, font, in_pixels, mesh, px};
 use crate::terminal::number::rounded;
 use anyhow::{Result, anyhow};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+/// Width in pixels: on a telephone's screen, the type can still be read.
+const WIDTH: u32 = 480;
+/// Stretches to which a run is thinned out, at least: somewhat more than there are pixels.
+const POINTS: u64 = 500;
 /// Height in pixels of a chart with its names, of the names, and of the title.
 const HEIGHT: u32 = 160;
 const NAMES: u32 = 18;
-const TITLE: u32 = 40;
+const TITLE: u32 = 32;
 /// Place of a chart's names from the left, in pixels: above the axis.
 const LEFT: u32 = 72;
 /// Relative difference of two columns that are the same but for the rounding to binary32.
@@ -32,7 +36,7 @@ const CHARTS: usize = 40;
 /// Width of a character in a chart's names, in pixels.
 const LABEL: u32 = 8;
 /// Characters of a line of constants, and its height in pixels.
-const LINE: usize = 110;
+const LINE: usize = 60;
 const LINE_HEIGHT: u32 = 22;
 /// Colors of a chart's signals, or of an array's elements; told apart by the colour-blind, too (Okabe and Ito). A reference has the colour of
 /// its signal, and is dashed.
@@ -300,7 +304,7 @@ impl Curves {
         let height = TITLE + charts.len() as u32 * HEIGHT + (lines.len() as u32 + 1) * LINE_HEIGHT;
         let drawn = self.draw_into(title, &charts, &lines, height, &mut svg);
         drawn.map_err(|error| anyhow!("cannot draw: {error}"))?;
-        Ok(in_pixels(&svg, SIZE, height))
+        Ok(in_pixels(&svg, WIDTH, height))
     }
 
     fn draw_into(
@@ -311,10 +315,10 @@ impl Curves {
         height: u32,
         svg: &mut String,
     ) -> Outcome<()> {
-        let root = SVGBackend::with_string(svg, (px(SIZE), px(height))).into_drawing_area();
+        let root = SVGBackend::with_string(svg, (px(WIDTH), px(height))).into_drawing_area();
         root.fill(&WHITE)?;
         let (head, rest) = root.split_vertically(px(TITLE));
-        head.titled(title, font(20))?;
+        head.titled(title, font(16))?;
         let (rest, foot) = rest.split_vertically(px(charts.len() as u32 * HEIGHT));
         for (row, line) in lines.iter().enumerate() {
             let place = (px(LINE_HEIGHT) as i32, px(row as u32 * LINE_HEIGHT) as i32);
@@ -337,6 +341,21 @@ impl Curves {
         }
         root.present()?;
         Ok(())
+    }
+
+    /// Corners of a column's curve: steps, as the values are held; a stretch of many periods has both of its ends.
+    fn points(&self, column: usize, ends: &[f64]) -> Vec<(f64, f64)> {
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for (stretch, ends) in self.stretches.iter().zip(ends.windows(2)) {
+            let Some((low, high)) = stretch.ranges.get(column).copied().flatten() else { continue };
+            match points.last_mut() {
+                // The value is still held.
+                Some(last) if low == high && last.1 == high && last.0 == ends[0] => last.0 = ends[1],
+                _ if low == high => points.extend([(ends[0], low), (ends[1], high)]),
+                _ => points.extend([(ends[0], low), (ends[0], high), (ends[1], high)]),
+            }
+        }
+        points
     }
 
     /// Draws a chart; `ends` are the begin of the first stretch and the ends of all.
@@ -376,21 +395,17 @@ impl Curves {
             let text = format!("limit {} {}", rounded(limit, 6), self.unit(columns));
             let style = font(12).with_color(LIMIT).into_text_style(&area);
             let style = style.pos(Pos::new(HPos::Right, if limit > 0.0 { VPos::Top } else { VPos::Bottom }));
-            chart.draw_series([Text::new(text.trim_end().to_owned(), (end, limit), style)])?;
+            // Beside the line, on the side of the values.
+            let beside = limit - limit.signum() * margin / 2.0;
+            chart.draw_series([Text::new(text.trim_end().to_owned(), (end, beside), style)])?;
         }
         // References lie below.
         let (references, signals): (Vec<&Drawn>, Vec<&Drawn>) =
             drawn.iter().partition(|curve| curve.is_reference);
         for curve in references.into_iter().chain(signals.into_iter().rev()) {
-            // Steps, as the values are held; a stretch of many periods has both of its ends.
-            let points = self.stretches.iter().enumerate().filter_map(|(index, stretch)| {
-                let (low, high) = stretch.ranges.get(curve.column).copied().flatten()?;
-                let (from, to) = (ends[index], ends[index + 1]);
-                Some([(from, low), (from, high), (to, high)])
-            });
-            let points = points.flatten();
+            let points = self.points(curve.column, ends);
             if curve.is_reference {
-                dashed(&mut chart, points, curve.color)?;
+                dashed(&mut chart, points.into_iter(), curve.color)?;
             } else {
                 chart.draw_series(LineSeries::new(points, curve.color.stroke_width(px(1))))?;
             }
