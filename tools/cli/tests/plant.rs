@@ -317,7 +317,7 @@ fn the_pictures_of_the_examples_are_fresh() {
         let line = format!("run {name}.s {rest} --plot {}", out.display());
         let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
         command.current_dir(&programs);
-        RunOutput::of(command).ok();
+        assert_eq!(RunOutput::of(command).status, Some(0), "{name}");
         let drawn = std::fs::read_to_string(out).unwrap();
         let path = format!("{}/../../docs/pictures/{picture}.svg", env!("CARGO_MANIFEST_DIR"));
         if std::env::var_os("TAKT_BLESS").is_some() {
