@@ -22,6 +22,8 @@
     (modify-syntax-entry ?\; "<" table)
     (modify-syntax-entry ?\n ">" table)
     (modify-syntax-entry ?. "_" table)
+    ;; Operators end a name; by default, Emacs takes most of them for parts of it.
+    (dolist (operator (string-to-list "+-*/%<>=&|^!~?")) (modify-syntax-entry operator "." table))
     (modify-syntax-entry ?_ "_" table)
     table))
 
