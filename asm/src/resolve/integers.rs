@@ -251,8 +251,8 @@ impl Resolver<'_> {
         Ok(term(quotient))
     }
 
-    /// Rejects a remainder that the index of a loop decides, in an iteration that is written out, if the machine would find another one: the
-    /// same line must not mean two things.
+    /// Rejects a quotient or remainder that the index of a loop decides, in an iteration that is written out, if the machine would find
+    /// another one: the same line must not mean two things.
     pub(super) fn same_at_run_time(
         &mut self,
         at: AstPlace,
@@ -261,8 +261,15 @@ impl Resolver<'_> {
         nodes: &[Node],
         span: Span,
     ) -> Result<(), ErrorReported> {
-        let (Operator::Rem, (Value::Int(a), Value::Int(b))) = (operator, operands) else { return Ok(()) };
-        if a.checked_rem(b).is_none_or(|rest| rest == 0 || (rest < 0) == (b < 0)) {
+        let (Value::Int(a), Value::Int(b)) = operands else { return Ok(()) };
+        let Some(rest) = a.checked_rem(b).filter(|rest| *rest != 0) else { return Ok(()) };
+        let differs = match operator {
+            Operator::Rem => (rest < 0) != (b < 0),
+            // By other divisors the machine computes no quotient.
+            Operator::Div => b.unsigned_abs().is_power_of_two(),
+            _ => false,
+        };
+        if !differs {
             return Ok(());
         }
         let mut names = nodes.iter().filter_map(|node| match node.kind {
@@ -273,16 +280,26 @@ impl Resolver<'_> {
             return Ok(());
         };
         let index = self.context.scopes.text(index).to_owned();
-        let message = format!(
-            "`%` of a negative number, in an iteration of the loop over `{index}` that is written out"
-        );
-        let truncated = a.wrapping_rem(b);
-        let error = Diagnostic::error("equation", span, message)
-            .note(format!(
-                "{a} % {b} is {truncated} where the program computes it, and {} where the assembler does",
-                truncated + b
-            ))
-            .help(format!("add a multiple of {b} to the dividend, so that it is never negative"));
+        let place = format!("in an iteration of the loop over `{index}` that is written out");
+        let two = |at_run_time: i64, exact: Value| {
+            let text = operator.text();
+            format!(
+                "{a} {text} {b} is {at_run_time} where the program computes it, and {exact} where the assembler does"
+            )
+        };
+        let error = match operator {
+            Operator::Rem => {
+                Diagnostic::error("equation", span, format!("`%` of a negative number, {place}"))
+                    .note(two(rest, Value::Int(rest + b)))
+                    .help(format!("add a multiple of {b} to the dividend, so that it is never negative"))
+            }
+            _ => Diagnostic::error("equation", span, format!("`/` of numbers that do not divide, {place}"))
+                .note(two(a / b, Value::Real(a as f64 / b as f64)))
+                .help(format!(
+                    "`>> {}` gives the integer below the quotient, `itof(a)/{b}.0` the float",
+                    b.unsigned_abs().trailing_zeros()
+                )),
+        };
         Err(self.context.report(at.scope, error))
     }
 
