@@ -51,11 +51,21 @@ pub fn textmate_text() -> String {
     serde_json::to_string_pretty(&textmate()).unwrap_or_default() + "\n"
 }
 
+/// Directives that declare the names behind them.
+const DECLARING: [Directive; 7] = [
+    Directive::Const,
+    Directive::Param,
+    Directive::Input,
+    Directive::Output,
+    Directive::State,
+    Directive::Reg,
+    Directive::Array,
+];
+
 /// Words of the language by kind, in the order of the tables.
 struct Words {
     directives: Vec<&'static str>,
     mnemonics: Vec<&'static str>,
-    functions: Vec<&'static str>,
     /// Names of built-in constants; those of one letter are left out, since most programs call a register so.
     constants: Vec<&'static str>,
 }
@@ -65,7 +75,6 @@ impl Words {
         Words {
             directives: Directive::ALL.iter().map(|directive| directive.name()).collect(),
             mnemonics: ROWS.iter().map(|row| row.mnemonic).collect(),
-            functions: Function::ALL.iter().map(|function| function.name()).collect(),
             constants: BUILTINS.iter().map(|builtin| builtin.0).filter(|name| name.len() > 1).collect(),
         }
     }
@@ -73,9 +82,9 @@ impl Words {
 
 /// Syntax file for Vim and Neovim.
 pub fn vim() -> String {
-    let Words { directives, mnemonics, functions, constants } = Words::of_the_tables();
-    let [directives, mnemonics, functions, constants] =
-        [directives, mnemonics, functions, constants].map(|words| words.join(" "));
+    let Words { directives, mnemonics, constants } = Words::of_the_tables();
+    let [directives, mnemonics, constants] = [directives, mnemonics, constants].map(|words| words.join(" "));
+    let declaring = DECLARING.map(|directive| &directive.name()[1..]).join(r"\|");
     format!(
         r#"" Takt in Vim and Neovim. Generated from the tables by `cargo xtask docs`; do not edit.
 if exists('b:current_syntax')
@@ -84,9 +93,10 @@ endif
 syntax iskeyword @,48-57,_,.
 syntax keyword taktDirective {directives}
 syntax keyword taktMnemonic {mnemonics}
-syntax keyword taktFunction {functions}
 syntax keyword taktConstant {constants}
 syntax match taktNumber /\v[0-9A-Za-z_.}}]@1<!(0[xX]\x[0-9a-fA-F_]*|0[bB][01][01_]*|\d[0-9_]*(\.[0-9_]*)?([eE][-+]?\d+)?|\.\d[0-9_]*([eE][-+]?\d+)?)/
+syntax match taktFunction /[A-Za-z_][A-Za-z0-9_.]*\ze(/
+syntax match taktName /\(^\s*\.\({declaring}\)\s\+\)\@<=[^;=]*/ contains=taktNumber
 syntax match taktLabel /^\s*[A-Za-z_][A-Za-z0-9_.{{}}]*\ze:/
 syntax match taktFile /\(\.include\s*\)\@<=<[^>]*>/
 syntax region taktText start=/"/ skip=/\\./ end=/"/ oneline
@@ -95,6 +105,7 @@ highlight default link taktDirective PreProc
 highlight default link taktMnemonic Statement
 highlight default link taktFunction Function
 highlight default link taktConstant Constant
+highlight default link taktName Identifier
 highlight default link taktNumber Number
 highlight default link taktLabel Label
 highlight default link taktFile String
@@ -107,7 +118,7 @@ let b:current_syntax = 'takt'
 
 /// Words for the colours of Emacs' `takt-mode`.
 pub fn emacs() -> String {
-    let Words { directives, mnemonics, functions, constants } = Words::of_the_tables();
+    let Words { directives, mnemonics, constants } = Words::of_the_tables();
     let list = |name: &str, text: &str, words: Vec<&str>| {
         let words: Vec<String> = words.iter().map(|word| format!("{word:?}")).collect();
         format!("(defconst takt-{name}\n  '({})\n  \"{text}\")\n\n", words.join(" "))
@@ -118,7 +129,7 @@ pub fn emacs() -> String {
          (provide 'takt-words)\n;;; takt-words.el ends here\n",
         list("directives", "Directives.", directives),
         list("mnemonics", "Names of instructions.", mnemonics),
-        list("functions", "Functions in equations.", functions),
         list("constants", "Names of constants.", constants),
+        list("declaring", "Directives that declare names.", DECLARING.map(Directive::name).to_vec()),
     )
 }

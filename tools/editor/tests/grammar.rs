@@ -39,10 +39,9 @@ fn helix_builds_the_grammar_from_a_folder_that_is_there() {
 }
 
 /// Source with words of every kind.
-const COLOURED: &str =
-    "; fadd 1\n.include <math.s>\nlaw: fadd u, e, 0x1f\n u = sat(sin(2.5e-3*pi), fold)\n.error \"fadd\"\n";
+const COLOURED: &str = "; fadd 1\n.include <math.s>\nlaw: fadd u, e, 0x1f\n u = sat(sin(2.5e-3*pi), fold)\n.error \"fadd\"\n.const gain = 2\n";
 /// Line and column from 1 of the first letter of words, the group of each in Vim, and the face in Emacs.
-const COLOURS: [(usize, usize, &str, &str); 11] = [
+const COLOURS: [(usize, usize, &str, &str); 12] = [
     (1, 3, "taktComment", "font-lock-comment-face"),
     (2, 1, "taktDirective", "font-lock-preprocessor-face"),
     (2, 10, "taktFile", "font-lock-string-face"),
@@ -50,10 +49,11 @@ const COLOURS: [(usize, usize, &str, &str); 11] = [
     (3, 6, "taktMnemonic", "font-lock-keyword-face"),
     (3, 14, "", "nil"),
     (3, 17, "taktNumber", "font-lock-constant-face"),
-    (4, 6, "", "nil"),
-    (4, 10, "taktFunction", "font-lock-builtin-face"),
+    (4, 6, "taktFunction", "font-lock-function-name-face"),
+    (4, 10, "taktFunction", "font-lock-function-name-face"),
     (4, 21, "taktConstant", "font-lock-constant-face"),
     (5, 9, "taktText", "font-lock-string-face"),
+    (6, 8, "taktName", "font-lock-variable-name-face"),
 ];
 
 fn said(command: &mut Command) -> String {

@@ -12,13 +12,13 @@
   '("nop" "jmp" "bz" "bnz" "call" "ret" "wait" "halt" "loop" "publish" "ld" "st" "mov" "li" "iadd" "isub" "iand" "ior" "ixor" "ishl" "ishr" "isar" "ieq" "ilt" "iltu" "sel" "rdflags" "clrflags" "fabs" "fneg" "fsign" "fmin" "fmax" "fsat" "feq" "flt" "fle" "fadd" "fsub" "itof" "ftoi" "fmul" "fdiv" "fsqrt" "imul24" "fma" "fms" "fnma" "fnms" "fsin" "fcos" "fatan2" "facos")
   "Names of instructions.")
 
-(defconst takt-functions
-  '("sqrt" "sin" "cos" "tan" "atan2" "asin" "acos" "exp" "log" "abs" "min" "max" "floor" "ceil" "round" "int" "float" "xor" "bits")
-  "Functions in equations.")
-
 (defconst takt-constants
   '("pi" "PI" "inf" "nan")
   "Names of constants.")
+
+(defconst takt-declaring
+  '(".const" ".param" ".input" ".output" ".state" ".reg" ".array")
+  "Directives that declare names.")
 
 (provide 'takt-words)
 ;;; takt-words.el ends here

@@ -219,7 +219,7 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
         kept: Mutex::new(ResultCache::open(&key)),
         key,
         workers: Workers::new("explore", &arguments.work)?,
-        bar: DelayedProgress::new(Some(arguments.candidates), "rows"),
+        bar: DelayedProgress::new(Some(arguments.candidates), "machines"),
         tried: 0,
         least: None,
         all: Vec::new(),

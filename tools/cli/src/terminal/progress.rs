@@ -35,6 +35,7 @@ pub(crate) fn progress(count: u64, what: &str, quiet: bool) -> ProgressBar {
     .with_key("to_go", to_go);
     let bar = ProgressBar::new(count).with_style(style);
     if stderr().is_terminal() {
+        bar.enable_steady_tick(SOON);
         interrupt::takes_away(&bar);
     }
     bar
@@ -47,6 +48,8 @@ fn to_go(state: &ProgressState, out: &mut dyn fmt::Write) {
     if done > 0 && (done * 10 >= all || state.elapsed() >= KNOWN) {
         let left = state.elapsed().mul_f64(all.saturating_sub(done) as f64 / done as f64);
         let _ = write!(out, ", {:#} to go", HumanDuration(left));
+    } else {
+        let _ = write!(out, ", {} s so far", state.elapsed().as_secs());
     }
 }
 

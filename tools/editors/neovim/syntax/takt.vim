@@ -5,9 +5,10 @@ endif
 syntax iskeyword @,48-57,_,.
 syntax keyword taktDirective .machine .reg .state .input .output .array .const .param .preset .once .period .data .float .word .space .macro .endm .rep .endr .for .endfor .if .elif .else .endif .include .loc .error .schedule .contract .fast .ports .loop_bound .range .result .assume .deadline .order .late .raw
 syntax keyword taktMnemonic nop jmp bz bnz call ret wait halt loop publish ld st mov li iadd isub iand ior ixor ishl ishr isar ieq ilt iltu sel rdflags clrflags fabs fneg fsign fmin fmax fsat feq flt fle fadd fsub itof ftoi fmul fdiv fsqrt imul24 fma fms fnma fnms fsin fcos fatan2 facos
-syntax keyword taktFunction sqrt sin cos tan atan2 asin acos exp log abs min max floor ceil round int float xor bits
 syntax keyword taktConstant pi PI inf nan
 syntax match taktNumber /\v[0-9A-Za-z_.}]@1<!(0[xX]\x[0-9a-fA-F_]*|0[bB][01][01_]*|\d[0-9_]*(\.[0-9_]*)?([eE][-+]?\d+)?|\.\d[0-9_]*([eE][-+]?\d+)?)/
+syntax match taktFunction /[A-Za-z_][A-Za-z0-9_.]*\ze(/
+syntax match taktName /\(^\s*\.\(const\|param\|input\|output\|state\|reg\|array\)\s\+\)\@<=[^;=]*/ contains=taktNumber
 syntax match taktLabel /^\s*[A-Za-z_][A-Za-z0-9_.{}]*\ze:/
 syntax match taktFile /\(\.include\s*\)\@<=<[^>]*>/
 syntax region taktText start=/"/ skip=/\\./ end=/"/ oneline
@@ -16,6 +17,7 @@ highlight default link taktDirective PreProc
 highlight default link taktMnemonic Statement
 highlight default link taktFunction Function
 highlight default link taktConstant Constant
+highlight default link taktName Identifier
 highlight default link taktNumber Number
 highlight default link taktLabel Label
 highlight default link taktFile String

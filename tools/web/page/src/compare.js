@@ -80,7 +80,7 @@ export class Comparison {
       return { title, box, element: node("section", { className: "compare-side" }, title, box) };
     };
     this.sides = [side(), side()];
-    this.pipelines = [new Pipeline(this.sides[0].box, () => {}), new Pipeline(this.sides[1].box, reveal)];
+    this.pipelines = [new Pipeline(this.sides[0].box, (operation) => this.before.source === this.after.source && reveal(operation)), new Pipeline(this.sides[1].box, reveal)];
     this.legend = node("div", { className: "tp-legend compare-legend" });
     this.all = node("input", { type: "checkbox" });
     this.all.addEventListener("change", () => this.rows());

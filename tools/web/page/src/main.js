@@ -549,7 +549,7 @@ function showParameters() {
     const chip = Object.assign(document.createElement("span"), { className: "chip", textContent: `${change.name} = ${change.value} from ${change.period} ` });
     chip.append(close);
     return chip;
-  }), ...(changes.length ? [] : ["a click on a curve sets it"]));
+  }), ...(changes.length ? [] : [matchMedia("(pointer: coarse)").matches ? "from there on" : "a click on a curve sets it"]));
   plots.mark = all.length ? { from: from(), changes, picked: (period) => ((el("from").value = period), act()) } : null;
 }
 
@@ -835,7 +835,10 @@ async function compare() {
     const title = { opened: `as opened, on ${assembled.machine}`, kept: `kept, on ${assembled.machine}` }[side] ?? `on ${assembled.machine}`;
     Object.assign(comparison, { key, side: { title, name: wanted.name, source: wanted.source, picture } });
   }
-  if (program === state.program) comparison.show(comparison.side, { title: side.startsWith("on ") ? `on ${program.machine}` : `now, on ${program.machine}`, name: state.name, source: editor.text, picture: pipeline.data });
+  if (program !== state.program) return;
+  // From what was to what is, and from this machine to another.
+  const isMachine = side.startsWith("on "), own = { title: isMachine ? `on ${program.machine}` : `now, on ${program.machine}`, name: state.name, source: editor.text, picture: pipeline.data };
+  comparison.show(...(isMachine ? [own, comparison.side] : [comparison.side, own]));
 }
 
 /** Splits a place such as `pi.s:12` or `pi.s:12:3-9` into file and line. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Columns of a table over time as SVG: those of one unit share charts, as on the page.
 
-use super::{Area, Axes, CUT, LIMIT, Outcome, chart, font, in_pixels, mesh, px};
+use super::{Area, Axes, CUT, Outcome, font, in_pixels, mesh, px};
 use crate::terminal::number::rounded;
 use anyhow::{Result, anyhow};
 use plotters::element::DashedPathElement;
@@ -13,11 +13,11 @@ const WIDTH: u32 = 480;
 /// Stretches to which a run is thinned out, at least: somewhat more than there are pixels.
 const POINTS: u64 = 500;
 /// Height in pixels of a chart with its names, of the names, and of the title.
-const HEIGHT: u32 = 160;
+const HEIGHT: u32 = 150;
 const NAMES: u32 = 18;
-const TITLE: u32 = 32;
+const TITLE: u32 = 36;
 /// Place of a chart's names from the left, in pixels: above the axis.
-const LEFT: u32 = 72;
+const LEFT: u32 = 62;
 /// Relative difference of two columns that are the same but for the rounding to binary32.
 const SAME: f64 = 1e-6;
 /// Most columns of a chart that have nothing in common but their unit, and the largest ratio of their ranges.
@@ -28,8 +28,8 @@ const BRIEF: f64 = 2.0;
 /// A limit is drawn if a value reaches this fraction of it.
 const NEAR: f64 = 0.4;
 /// Dashes of references and limits, and the line before a name, in pixels.
-const DASH: u32 = 8;
-const GAP: u32 = 5;
+const DASH: u32 = 4;
+const GAP: u32 = 4;
 const SAMPLE: u32 = 18;
 /// Most charts; further columns are left out.
 const CHARTS: usize = 40;
@@ -38,6 +38,9 @@ const LABEL: u32 = 8;
 /// Characters of a line of constants, and its height in pixels.
 const LINE: usize = 60;
 const LINE_HEIGHT: u32 = 22;
+/// Color of limits, and of the time in which a column is at its limit, as on the page.
+const LIMIT: RGBColor = RGBColor(0xa3, 0x15, 0x6b);
+const SATURATED: RGBColor = RGBColor(0xd9, 0x8a, 0x1f);
 /// Colors of a chart's signals, or of an array's elements; told apart by the colour-blind, too (Okabe and Ito). A reference has the colour of
 /// its signal, and is dashed.
 const COLORS: [RGBColor; 8] = [
@@ -241,6 +244,24 @@ impl Curves {
         found
     }
 
+    /// Runs of stretches, from the first to behind the last, in which a column of a chart is at its limit.
+    fn saturated(&self, columns: &[usize]) -> Vec<(usize, usize)> {
+        let limits: Vec<(usize, f64)> =
+            columns.iter().filter_map(|column| Some((*column, (*self.limits.get(*column)?)?))).collect();
+        let mut runs: Vec<(usize, usize)> = Vec::new();
+        for (index, stretch) in self.stretches.iter().enumerate() {
+            let is_at = |(column, limit): &(usize, f64)| {
+                stretch.ranges[*column].is_some_and(|(low, high)| high >= *limit || low <= -*limit)
+            };
+            match runs.last_mut() {
+                _ if !limits.iter().any(is_at) => {}
+                Some(last) if last.1 == index => last.1 += 1,
+                _ => runs.push((index, index + 1)),
+            }
+        }
+        runs
+    }
+
     /// Columns of a chart with their colours.
     fn drawn(&self, columns: &[usize]) -> Vec<Drawn> {
         let signal = |column: usize| self.signal_of(column).filter(|signal| columns.contains(signal));
@@ -318,12 +339,8 @@ impl Curves {
         let root = SVGBackend::with_string(svg, (px(WIDTH), px(height))).into_drawing_area();
         root.fill(&WHITE)?;
         let (head, rest) = root.split_vertically(px(TITLE));
-        head.titled(title, font(16))?;
+        head.margin(px(8), 0, 0, 0).titled(title, font(16))?;
         let (rest, foot) = rest.split_vertically(px(charts.len() as u32 * HEIGHT));
-        for (row, line) in lines.iter().enumerate() {
-            let place = (px(LINE_HEIGHT) as i32, px(row as u32 * LINE_HEIGHT) as i32);
-            foot.draw_text(line, &font(13).into_text_style(&foot), place)?;
-        }
         // Without a length, a period's values stand around the period's number, from 1.
         let (length, begin, label) = match self.period {
             Some(period) if self.rows as f64 * period <= BRIEF => (period * 1e3, 0.0, "time, ms"),
@@ -333,11 +350,14 @@ impl Curves {
         let length = length * self.every as f64;
         let ends: Vec<f64> =
             (0..=self.stretches.len().max(1)).map(|end| begin + length * end as f64).collect();
-        for (number, (columns, area)) in
-            charts.iter().zip(rest.split_evenly((charts.len().max(1), 1))).enumerate()
-        {
-            let label = if number + 1 == charts.len() { label } else { "" };
-            self.draw_chart(columns, &area, &ends, label)?;
+        for (columns, area) in charts.iter().zip(rest.split_evenly((charts.len().max(1), 1))) {
+            self.draw_chart(columns, &area, &ends)?;
+        }
+        let centred = font(13).into_text_style(&foot).pos(Pos::new(HPos::Center, VPos::Top));
+        foot.draw_text(label, &centred, ((px(LEFT) + px(WIDTH)) as i32 / 2, 0))?;
+        for (row, line) in lines.iter().enumerate() {
+            let place = (px(LINE_HEIGHT) as i32, px((row as u32 + 1) * LINE_HEIGHT) as i32);
+            foot.draw_text(line, &font(13).into_text_style(&foot), place)?;
         }
         root.present()?;
         Ok(())
@@ -359,7 +379,7 @@ impl Curves {
     }
 
     /// Draws a chart; `ends` are the begin of the first stretch and the ends of all.
-    fn draw_chart(&self, columns: &[usize], area: &Area<'_>, ends: &[f64], label: &str) -> Outcome<()> {
+    fn draw_chart(&self, columns: &[usize], area: &Area<'_>, ends: &[f64]) -> Outcome<()> {
         let limits = self.limits(columns);
         let (low, high) = self.ends(columns).unwrap_or((0.0, 1.0));
         let (low, high) =
@@ -387,8 +407,17 @@ impl Curves {
             names.draw_text(name, &style, (px(left + SAMPLE + GAP) as i32, px(2) as i32))?;
             left += SAMPLE + GAP + LABEL * (name.chars().count() as u32 + 2);
         }
-        let mut chart = chart(&area).build_cartesian_2d(begin..end, low - margin..high + margin)?;
-        mesh(&mut chart, label, self.unit(columns))?;
+        let (bottom, top) = (low - margin, high + margin);
+        let mut chart = ChartBuilder::on(&area)
+            .margin_right(px(18))
+            .x_label_area_size(px(24))
+            .y_label_area_size(px(LEFT))
+            .build_cartesian_2d(begin..end, bottom..top)?;
+        mesh(&mut chart, "", self.unit(columns))?;
+        for (from, to) in self.saturated(columns) {
+            let corners = [(ends[from], bottom), (ends[to], top)];
+            chart.draw_series([Rectangle::new(corners, SATURATED.mix(0.16).filled())])?;
+        }
         for limit in limits {
             let line = [(begin, limit), (end, limit)];
             dashed(&mut chart, line.into_iter(), LIMIT)?;
@@ -399,15 +428,15 @@ impl Curves {
             let beside = limit - limit.signum() * margin / 2.0;
             chart.draw_series([Text::new(text.trim_end().to_owned(), (end, beside), style)])?;
         }
-        // References lie below.
+        // References lie below, then inputs, which come before outputs.
         let (references, signals): (Vec<&Drawn>, Vec<&Drawn>) =
             drawn.iter().partition(|curve| curve.is_reference);
-        for curve in references.into_iter().chain(signals.into_iter().rev()) {
+        for curve in references.into_iter().chain(signals) {
             let points = self.points(curve.column, ends);
             if curve.is_reference {
                 dashed(&mut chart, points.into_iter(), curve.color)?;
             } else {
-                chart.draw_series(LineSeries::new(points, curve.color.stroke_width(px(1))))?;
+                chart.draw_series(LineSeries::new(points, curve.color.stroke_width(px(3) / 2)))?;
             }
         }
         Ok(())
