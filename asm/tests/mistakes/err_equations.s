@@ -63,6 +63,7 @@ period:
 .reg    rest:int
         .for    i, -3, -1 unroll 2
         rest = i % 4
+        rest = i / 4
         .endfor
         wait    period
 .macro  later d, of

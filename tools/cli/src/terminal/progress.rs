@@ -35,7 +35,6 @@ pub(crate) fn progress(count: u64, what: &str, quiet: bool) -> ProgressBar {
     .with_key("to_go", to_go);
     let bar = ProgressBar::new(count).with_style(style);
     if stderr().is_terminal() {
-        bar.enable_steady_tick(SOON);
         interrupt::takes_away(&bar);
     }
     bar
@@ -74,7 +73,8 @@ impl DelayedProgress {
         let show = move || {
             if let (Some(bar), Err(RecvTimeoutError::Timeout)) = (shown, done.recv_timeout(SOON)) {
                 bar.set_draw_target(ProgressDrawTarget::stderr());
-                bar.tick();
+                // The time so far goes on where an item takes long.
+                bar.enable_steady_tick(SOON);
             }
         };
         let thread = bar.is_some().then(|| thread::Builder::new().spawn(show).ok()).flatten();
