@@ -7,6 +7,7 @@
 //! to compare with. An instruction that is added to the table is in the program without a change here.
 
 mod run;
+mod text;
 
 pub use run::{Clock, Comparison, LoopBack, Options, Report, check, run};
 
@@ -98,6 +99,11 @@ pub enum SelftestError {
         /// Value of the kit.
         wanted: u32,
     },
+    /// The board has the program of another kit: registers lie elsewhere.
+    #[error(
+        "the board carries another program than that of this hardware kit, from record {0} on; configure it with the bitstream built from these files, or load the program with `takt load`"
+    )]
+    OtherProgram(usize),
     /// The program has stopped on the board.
     #[error("the program has stopped on the board: {0}, after {1} operands")]
     Stopped(String, u32),

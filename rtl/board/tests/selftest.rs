@@ -15,8 +15,11 @@ use takt_isa::{MACHINES, Machine, Program, ROWS, T1};
 use takt_rtl::verilator;
 
 fn program(machine: &'static Machine) -> Program {
-    let text = source(machine, "machine.toml").unwrap_or_else(|error| panic!("{error}"));
-    let loader = MemoryLoader::new(&[("selftest.s", text.as_str())]);
+    assembled(machine, &source(machine, "machine.toml").unwrap_or_else(|error| panic!("{error}")))
+}
+
+fn assembled(machine: &'static Machine, text: &str) -> Program {
+    let loader = MemoryLoader::new(&[("selftest.s", text)]);
     let options = AssemblyOptions { machine, ..AssemblyOptions::default() };
     let assembled = assemble("selftest.s", &loader, &options).unwrap_or_else(|error| panic!("{error:?}"));
     assert_eq!(assembled.warnings.render(false), "", "{}", machine.name);
@@ -141,10 +144,26 @@ fn a_right_board_is_right_and_a_fault_is_named() {
     let report = bench.run(&mut host);
     assert!(different(&report).is_empty() && report.pulses.is_wired() && !report.is_right(), "{report:#?}");
 
+    // Another program, whose registers may lie elsewhere.
+    let mut host = bench.host(0, [true; 2]);
+    let text = source(&T1, "")
+        .expect("a source")
+        .replace("result, a, b\n        fold    digest_fmul", "result, a, a\n        fold    digest_fmul");
+    let other = assembled(&T1, &text);
+    let expected = emulate(&other, OPERANDS).expect("it runs");
+    let refused = run(&mut host, &bench.wiring, &other, &expected, options, |_| ());
+    assert!(
+        matches!(refused, Err(SelftestError::OtherProgram(_) | SelftestError::Other { .. })),
+        "{refused:?}"
+    );
+
     let found: Vec<Vec<String>> = (1..=FAULTS.len())
         .map(|fault| {
             let report = bench.run(&mut bench.host(fault, [false; 2]));
-            assert_eq!(report.is_right(), different(&report).is_empty(), "{report:#?}");
+            let text = report.text(&bench.board, &bench.wiring, "t1", "0", 1).expect("a text");
+            let is_named =
+                different(&report).iter().all(|name| text.contains(&format!(" {name} DIFFERENT: 0x")));
+            assert!(is_named && text.ends_with("NOT RIGHT\n"), "{text}");
             different(&report).into_iter().map(str::to_owned).collect()
         })
         .collect();

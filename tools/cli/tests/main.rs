@@ -5,6 +5,7 @@ mod batch;
 mod board;
 mod board_pins;
 mod board_plant;
+mod board_selftest;
 mod board_system;
 mod cache;
 mod circuit;

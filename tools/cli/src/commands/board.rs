@@ -12,6 +12,7 @@ pub(crate) mod pins;
 mod plant_at_pins;
 #[cfg(unix)]
 mod robot;
+mod selftest;
 mod sim;
 
 use crate::run::application;
@@ -46,6 +47,7 @@ enum Command {
     Check(Check),
     Build(Build),
     Sim(Box<sim::Sim>),
+    Selftest(Box<selftest::Selftest>),
     Hal(hal::Hal),
 }
 
@@ -89,6 +91,23 @@ struct Build {
     /// Output folder; created if it does not exist.
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
+    #[command(flatten)]
+    placement: Placement,
+    /// Write a project for the tools of the device's maker, and call nothing; nobody has run one yet (docs/board.md).
+    #[arg(long, value_name = "FLOW", value_parser = flow(), conflicts_with_all = ["sources", "seed", "seeds", "time"])]
+    flow: Option<String>,
+    /// The core of a program on the AXI bus of the device's processors, in place of a board with pins, with programs that drive it from
+    /// Linux.
+    #[arg(long, requires = "flow", conflicts_with = "wiring")]
+    axi: bool,
+    /// Clock of bus and core with --axi, in MHz.
+    #[arg(long, value_name = "MHZ", default_value_t = 50.0, requires = "axi")]
+    clock: f64,
+}
+
+/// Effort of placing, and its end.
+#[derive(Args, Clone)]
+struct Placement {
     /// First seed of the placement; another one may reach a higher clock.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u32,
@@ -101,16 +120,6 @@ struct Build {
     /// Write the circuit and the pins only, without calling the tools.
     #[arg(long)]
     sources: bool,
-    /// Write a project for the tools of the device's maker, and call nothing; nobody has run one yet (docs/board.md).
-    #[arg(long, value_name = "FLOW", value_parser = flow(), conflicts_with_all = ["sources", "seed", "seeds", "time"])]
-    flow: Option<String>,
-    /// The core of a program on the AXI bus of the device's processors, in place of a board with pins, with programs that drive it from
-    /// Linux.
-    #[arg(long, requires = "flow", conflicts_with = "wiring")]
-    axi: bool,
-    /// Clock of bus and core with --axi, in MHz.
-    #[arg(long, value_name = "MHZ", default_value_t = 50.0, requires = "axi")]
-    clock: f64,
 }
 
 /// Value parser for the name of a flow, for clap.
@@ -288,6 +297,7 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
         Command::List(list) => self::list(list, color, out),
         Command::Build(build) => self::build(build, color, out),
         Command::Sim(sim) => sim::run(sim, color, out),
+        Command::Selftest(selftest) => selftest::run(selftest, color, out),
         Command::Hal(hal) => hal::run(hal, color, out),
         Command::Pins(pins) => self::pins(pins, color, out),
         Command::Check(check) => {
@@ -453,7 +463,8 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     }
     let (board, wiring, carried) = arguments.target.read(color, false)?;
     let (application, folder) = (carried.on_board(), &arguments.output);
-    if arguments.sources {
+    let Placement { seed, seeds, time, sources } = arguments.placement;
+    if sources {
         let circuit = takt_board::build::write(&board, &wiring, application, folder)?;
         writeln!(
             out,
@@ -479,8 +490,7 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     takt_board::top::circuit(&board, &wiring, application.clone())?;
     step("tools");
     let venv = Venv::with(&tools_folder()?, &packages)?;
-    let time = arguments.time.map(|minutes| Duration::from_secs(60 * u64::from(minutes)));
-    let Build { seed, seeds, .. } = *arguments;
+    let time = time.map(|minutes| Duration::from_secs(60 * u64::from(minutes)));
     let options = takt_board::build::Options { seed, seeds, time, netlist: false };
     let report = takt_board::build::build(&venv, &board, &wiring, application, options, folder, &step)?;
     drop(under_way);

@@ -96,6 +96,36 @@ impl Pins {
         self.input(name).map(|pin| pin.circuit.as_str())
     }
 
+    /// Parses wires such as `pulse.high=pulses.in` into outputs and inputs of the circuit. The inputs are not driven otherwise.
+    ///
+    /// # Errors
+    /// If a wire is malformed, or does not lead from an output pin to an input pin that nothing else drives.
+    pub(super) fn wires<'a>(
+        &mut self,
+        texts: impl IntoIterator<Item = &'a str>,
+    ) -> Result<Vec<(String, String)>, String> {
+        let mut wires: Vec<(String, String)> = Vec::new();
+        for text in texts {
+            let (from, to) = text.split_once('=').ok_or_else(|| {
+                format!("`{text}` is not `output=input`, two pins, as in `pulse.high=pulses.in`")
+            })?;
+            let Some(output) = self.outputs.iter().find(|pin| pin.name == from) else {
+                let names: Vec<&str> = self.outputs.iter().map(|pin| &*pin.name).collect();
+                let near = nearest(from, names.iter().copied());
+                let near = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
+                return Err(format!("{text}: no output pin `{from}`{near}; there are {}", names.join(", ")));
+            };
+            let input = self.circuit(to).map_err(|reason| format!("{text}: {reason}"))?;
+            if wires.iter().any(|(_, known)| known == input) {
+                return Err(format!("{text}: another wire leads to `{to}`"));
+            }
+            wires.push((output.circuit.clone(), input.to_owned()));
+        }
+        let inputs: Vec<String> = wires.iter().map(|(_, input)| input.clone()).collect();
+        self.leave_out(&inputs);
+        Ok(wires)
+    }
+
     /// Name for users of an output pin in the circuit.
     pub(super) fn shown<'p>(&'p self, circuit: &'p str) -> &'p str {
         self.output_name(circuit).unwrap_or(circuit)

@@ -34,7 +34,7 @@ use takt_board::{Host, Wiring};
 
 /// Run the complete top level in Verilator, with its UART on a pseudo-terminal that replaces a board's serial port.
 ///
-/// `takt load` and `takt live` talk to the port that is printed. Input pins are low until --set, --script, --inputs or --plant drives them;
+/// `takt load` and `takt live` talk to the port that is printed. Input pins are low until --set, --wire, --script, --inputs or --plant drives them;
 /// pins are named PERIPHERAL.PIN, or PERIPHERAL if it has one input. It runs slower than a board: a second of it takes minutes.
 #[derive(Args)]
 #[command(
@@ -51,6 +51,9 @@ pub(super) struct Sim {
     /// An input pin's level from power-up on; may be repeated.
     #[arg(long, value_name = "PIN=LEVEL", conflicts_with = "robot")]
     set: Vec<String>,
+    /// Connect an output pin to an input pin, `pulse.high=pulses.in`; may be repeated.
+    #[arg(long, value_name = "OUT=IN", conflicts_with = "robot")]
+    wire: Vec<String>,
     /// Commands that drive input pins, a line each: `set limit=1 stop=0`, `wait 5ms`, `show`, `quit`; `-` takes them from standard input as
     /// they come (docs/board.md).
     #[arg(long, value_name = "FILE", conflicts_with = "robot")]
@@ -198,6 +201,8 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     // Check the drivers of the pins before the circuit is compiled.
     let taken: Vec<&str> = arguments.axis.iter().filter_map(|text| text.split(',').nth(1)).collect();
     let mut pins = pins::Pins::new(&board, &wiring, &taken);
+    let wires =
+        pins.wires(arguments.wire.iter().map(String::as_str)).map_err(|text| anyhow!("--wire {text}"))?;
     let plant = match &arguments.plant {
         Some(path) => {
             let Application::Program(loaded) = &carried else {
@@ -226,6 +231,7 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
         // With --robot alone, this command is the host, and reports itself how its drive ended.
         sim.tell = (!arguments.robot || arguments.serve).then_some(output::message as fn(&str));
         levels.iter().for_each(|(pin, level)| sim.set(pin, *level));
+        wires.iter().for_each(|(output, input)| sim.wire(output, input));
         Ok(sim)
     };
     let run = || -> Result<()> {
