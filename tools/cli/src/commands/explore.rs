@@ -210,7 +210,12 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
             programs.iter().map(|program| cycles(arguments, program, machine)).collect()
         });
     }
-    interrupt::on_interrupt(|| STOPPED.store(true, Ordering::Relaxed))?;
+    interrupt::on_interrupt(|| {
+        if STOPPED.swap(true, Ordering::Relaxed) {
+            interrupt::end();
+        }
+        message("stopping after the machines that are being measured; Ctrl-C again ends at once");
+    })?;
     let mut search = Search {
         arguments,
         budget: arguments.device.map_or(arguments.budget, |device| arguments.budget.within(&device.room)),

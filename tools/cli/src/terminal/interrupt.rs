@@ -49,7 +49,8 @@ pub(crate) fn beside_bars<T>(print: impl FnOnce() -> T) -> T {
     }
 }
 
-fn end() {
+/// Ends the process as Ctrl-C does without a handler, with no bar left behind.
+pub(crate) fn end() {
     held(&BARS).iter().for_each(ProgressBar::finish_and_clear);
     // End by the signal, as without a handler, so that a loop in a shell also ends.
     #[cfg(unix)]

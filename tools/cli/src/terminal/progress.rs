@@ -14,8 +14,9 @@ use std::time::{Duration, Instant};
 
 /// Delay before progress is shown.
 const SOON: Duration = Duration::from_secs(1);
-/// Time after which the remaining time is estimated from any number of items.
+/// Time after which the remaining time is estimated, from this number of items at least.
 const KNOWN: Duration = Duration::from_secs(10);
+const SOME: u64 = 20;
 /// Interval between updates of progress whose end is unknown.
 const FRAME: Duration = Duration::from_millis(100);
 
@@ -40,11 +41,11 @@ pub(crate) fn progress(count: u64, what: &str, quiet: bool) -> ProgressBar {
     bar
 }
 
-/// Estimated remaining time, once a tenth of the items is done or [`KNOWN`] has passed: from the time that items took on average, since
-/// items differ, and an estimate from the last ones jumps.
+/// Estimated remaining time, once a tenth of the items is done, or [`SOME`] of them after [`KNOWN`]: from the time that items took on
+/// average, since items differ, and an estimate from the last ones jumps.
 fn to_go(state: &ProgressState, out: &mut dyn fmt::Write) {
     let (done, all) = (state.pos(), state.len().unwrap_or_default());
-    if done > 0 && (done * 10 >= all || state.elapsed() >= KNOWN) {
+    if done > 0 && (done * 10 >= all || (done >= SOME && state.elapsed() >= KNOWN)) {
         let left = state.elapsed().mul_f64(all.saturating_sub(done) as f64 / done as f64);
         let _ = write!(out, ", {:#} to go", HumanDuration(left));
     } else {

@@ -162,7 +162,7 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   let down = 0;
   plot.over.addEventListener("mousedown", (event) => (down = event.clientX));
   // A finger has no pointer above the chart: where it touches or moves, the values are told.
-  for (const kind of ["pointerdown", "pointermove"]) plot.over.addEventListener(kind, (event) => event.pointerType === "touch" && plot.setCursor({ left: event.clientX - plot.over.getBoundingClientRect().left, top: plot.over.clientHeight / 2 }));
+  for (const kind of ["pointerdown", "pointermove"]) plot.over.addEventListener(kind, (event) => event.pointerType === "touch" && plot.setCursor({ left: event.clientX - plot.over.getBoundingClientRect().left, top: plot.over.clientHeight / 2 }, true, true));
   // A click, not the end of a drag, which zooms; a finger only reads.
   if (picked) plot.over.addEventListener("click", (event) => event.pointerType !== "touch" && Math.abs(event.clientX - down) < 3 && plot.cursor.idx !== null && plot.cursor.idx !== undefined && picked(plot.cursor.idx));
   const resize = () => parent.clientWidth && plot.setSize({ width: width(), height: height() });

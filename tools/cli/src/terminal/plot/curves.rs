@@ -18,6 +18,8 @@ const NAMES: u32 = 18;
 const TITLE: u32 = 36;
 /// Place of a chart's names from the left, in pixels: above the axis.
 const LEFT: u32 = 62;
+/// Margin on the left, in pixels.
+const MARGIN: u32 = 6;
 /// Relative difference of two columns that are the same but for the rounding to binary32.
 const SAME: f64 = 1e-6;
 /// Most columns of a chart that have nothing in common but their unit, and the largest ratio of their ranges.
@@ -409,12 +411,18 @@ impl Curves {
         }
         let (bottom, top) = (low - margin, high + margin);
         let mut chart = ChartBuilder::on(&area)
+            .margin_left(px(MARGIN))
             .margin_right(px(18))
             .x_label_area_size(px(24))
-            .y_label_area_size(px(LEFT))
+            .y_label_area_size(px(LEFT - MARGIN))
             .build_cartesian_2d(begin..end, bottom..top)?;
         mesh(&mut chart, "", self.unit(columns))?;
-        for (from, to) in self.saturated(columns) {
+        let saturated = self.saturated(columns);
+        if !saturated.is_empty() {
+            let style = font(13).with_color(SATURATED).into_text_style(&names);
+            names.draw_text("shaded: at its limit", &style, (px(left) as i32, px(2) as i32))?;
+        }
+        for (from, to) in saturated {
             let corners = [(ends[from], bottom), (ends[to], top)];
             chart.draw_series([Rectangle::new(corners, SATURATED.mix(0.16).filled())])?;
         }
