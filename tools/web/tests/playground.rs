@@ -154,12 +154,18 @@ fn the_machine_shows_activity() {
     assert_eq!((&operations[0]["place"], &operations[0]["unit"]), (&json!("a.s:7"), &json!("add")));
 }
 
+/// Example of a name, of those that `about` lists.
+fn example(about: &Value, name: &str) -> Value {
+    let mut examples = about["examples"].as_array().expect("there are some").iter();
+    examples.find(|example| example["name"] == name).expect("it is there").clone()
+}
+
 #[test]
 fn every_example_assembles_and_runs() {
     let mut playground = Playground::default();
     let about = call(&mut playground, "about", Value::Null);
     let examples = about["examples"].as_array().expect("there are some");
-    assert_eq!(examples[0]["name"], "pi.s", "the integrator comes first");
+    assert_eq!(examples[0]["name"], "gains.s", "the README's example comes first");
     assert_eq!(examples.iter().filter(|example| example["track"] == true).count(), 1);
     for example in examples {
         assert_ne!(example["title"], "", "{}", example["name"]);
@@ -248,7 +254,7 @@ fn reports_values_that_are_not_numbers() {
 fn ports_have_units_and_limits() {
     let mut playground = Playground::default();
     let about = call(&mut playground, "about", Value::Null);
-    let pi = about["examples"][0].clone();
+    let pi = example(&about, "pi.s");
     let params = json!({ "name": "pi.s", "source": pi["source"], "machine": "t3" });
     let told = call(&mut playground, "assemble", params);
     assert_eq!((&told["outputs"][0]["unit"], &told["outputs"][0]["limit"]), (&json!("V"), &json!(24.0)));
@@ -512,8 +518,8 @@ fn loops_have_the_bits_of_takt_run() {
 fn a_plant_closes_the_loop() {
     let mut playground = Playground::default();
     let about = call(&mut playground, "about", Value::Null);
-    let pi = about["examples"][0].clone();
-    assert_eq!(pi["plant"]["name"], "dc_motor", "the first example closes its loop");
+    let pi = example(&about, "pi.s");
+    assert_eq!(pi["plant"]["name"], "dc_motor", "the example closes its loop");
     let with = |plant: Value, source: &str, inputs: &Value| json!({ "name": "pi.s", "source": source, "machine": "t3", "inputs": inputs, "plant": plant, "periods": 400 });
     let source = pi["source"].as_str().expect("a text");
     let told = call(&mut playground, "assemble", with(pi["plant"].clone(), source, &json!("")));
