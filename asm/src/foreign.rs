@@ -69,12 +69,14 @@ pub(crate) fn kind(name: &str, bytes: &[u8]) -> Option<(&'static str, &'static s
         .find(|(endings, ..)| extension.as_deref().is_some_and(|extension| endings.contains(&extension)));
     match by_name {
         Some((_, kind, command)) => Some((kind, command)),
-        None if is_source(name) => is_gnu(bytes).then_some(("GNU assembly for another processor", "")),
         None => {
             let beginning = BEGINNINGS.iter().find(|(first, _)| bytes.starts_with(first));
             // The assembler has better words for a source with a byte that is none of a text.
-            let is_binary = bytes.contains(&0);
-            Some((beginning.map(|(_, kind)| *kind).or(is_binary.then_some("binary data"))?, ""))
+            let by_contents = || match is_source(name) {
+                true => is_gnu(bytes).then_some("GNU assembly for another processor"),
+                false => bytes.contains(&0).then_some("binary data"),
+            };
+            Some((beginning.map(|(_, kind)| *kind).or_else(by_contents)?, ""))
         }
     }
 }
@@ -104,6 +106,7 @@ mod tests {
         assert!(of("prog", b"PK\x03\x04").contains("a ZIP archive"));
         assert!(of("standard input", b"<robot>").contains("XML"));
         assert!(of("prog", b"ab\0c").contains("binary data"));
+        assert!(of("a.s", b"PK\x03\x04").contains("a ZIP archive"));
         assert!(of("a.s", b"\t.text\n\t.globl f\nf:\tret\n").contains("GNU assembly"));
     }
 
