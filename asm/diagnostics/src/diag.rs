@@ -137,15 +137,24 @@ impl Diagnostic {
     pub fn did_you_mean_one_of(self, names: &[&str]) -> Diagnostic {
         match names {
             [] | [_] => self.did_you_mean(names.first().map(|name| (*name).to_owned())),
-            [init @ .., last] => {
-                let init: Vec<String> = init.iter().map(|name| format!("`{name}`")).collect();
-                self.help(format!("did you mean {} or `{last}`?", init.join(", ")))
+            _ => {
+                let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+                self.help(format!("did you mean {}?", alternatives(&quoted)))
             }
         }
     }
 
     fn span(&self) -> Span {
         self.labels.first().map_or(Span::default(), |label| label.span)
+    }
+}
+
+/// `a, b or c`.
+pub fn alternatives(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [init @ .., last] => format!("{} or {last}", init.join(", ")),
     }
 }
 

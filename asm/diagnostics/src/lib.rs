@@ -14,7 +14,7 @@ pub mod source;
 mod toml_mistake;
 
 pub use describe::describe;
-pub use diag::{Diagnostic, Diagnostics, Severity, Sink};
+pub use diag::{Diagnostic, Diagnostics, Severity, Sink, alternatives};
 pub use levels::Levels;
 pub use machine::machine;
 pub use nearest::{all_nearest, nearest};

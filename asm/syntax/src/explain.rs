@@ -7,8 +7,8 @@ use crate::grammar::ExpectedItems;
 use crate::lex::{Token, is_equation};
 use crate::name::NameId;
 use takt_diagnostics::diag::Diagnostic;
-use takt_diagnostics::nearest;
 use takt_diagnostics::source::Span;
+use takt_diagnostics::{alternatives, nearest};
 use takt_isa::ROWS;
 
 /// Renders an error of the grammar as a diagnostic.
@@ -50,7 +50,7 @@ pub(crate) fn describe<'s>(
     let diagnostic = Diagnostic::error("syntax", span, "");
     let mut diagnostic = diagnostic.here(match expected.len() {
         0 => "not expected here".to_owned(),
-        _ => format!("expected {}", list(&expected)),
+        _ => format!("expected {}", alternatives(&expected)),
     });
     let line = ErrorLine { tokens, at, is_alone, directive };
     let (message, help) = intention(&line, &shown);
@@ -176,14 +176,5 @@ fn mnemonic(tokens: &[(Token, Span)], at: usize) -> Option<&'static takt_isa::Ro
     match tokens.get(start.map_or(0, |start| start + 1))?.0 {
         Token::Name(NameId(name)) => ROWS.get(name as usize),
         _ => None,
-    }
-}
-
-/// `a, b or c`.
-fn list(items: &[String]) -> String {
-    match items {
-        [] => String::new(),
-        [one] => one.clone(),
-        [init @ .., last] => format!("{} or {last}", init.join(", ")),
     }
 }

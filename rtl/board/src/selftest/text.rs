@@ -4,6 +4,7 @@
 use super::{Comparison, LoopBack, Report, SelftestError, Wire, wires};
 use crate::boards::Board;
 use crate::wiring::Wiring;
+use textwrap::{Options, WordSplitter};
 
 /// Columns of a report.
 const WIDTH: usize = 80;
@@ -14,20 +15,13 @@ const SIMULATED: f64 = 50_000.0;
 
 /// Adds a line, filled to the width.
 fn add(text: &mut String, name: &str, line: &str) {
-    let mut column = NAME;
-    text.push_str(&format!("{name:<NAME$}"));
-    for (at, word) in line.split(' ').enumerate() {
-        let length = word.chars().count();
-        if at > 0 && column + 1 + length > WIDTH {
-            text.push_str(&format!("\n{:NAME$}", ""));
-            column = NAME;
-        } else if at > 0 {
-            text.push(' ');
-            column += 1;
-        }
-        text.push_str(word);
-        column += length;
-    }
+    let (name, blank) = (format!("{name:<NAME$}"), " ".repeat(NAME));
+    let options = Options::new(WIDTH)
+        .initial_indent(&name)
+        .subsequent_indent(&blank)
+        .break_words(false)
+        .word_splitter(WordSplitter::NoHyphenation);
+    *text += &textwrap::fill(line, options);
     text.push('\n');
 }
 

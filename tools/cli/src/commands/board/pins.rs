@@ -6,6 +6,7 @@ use super::text;
 use crate::run::ports;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number;
+use crate::terminal::options::suggest;
 use crate::terminal::output;
 use crate::terminal::progress::{self, DelayedProgress};
 use anyhow::{Context, Result, anyhow, bail};
@@ -13,7 +14,6 @@ use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, IsTerminal, Read, Write};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
-use takt_asm::nearest;
 use takt_board::kind::Direction;
 use takt_board::simulation::{EncoderMotion, Simulation};
 use takt_board::terminal::Terminal;
@@ -111,8 +111,7 @@ impl Pins {
             })?;
             let Some(output) = self.outputs.iter().find(|pin| pin.name == from) else {
                 let names: Vec<&str> = self.outputs.iter().map(|pin| &*pin.name).collect();
-                let near = nearest(from, names.iter().copied());
-                let near = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
+                let near = suggest(from, names.iter().copied());
                 return Err(format!("{text}: no output pin `{from}`{near}; there are {}", names.join(", ")));
             };
             let input = self.circuit(to).map_err(|reason| format!("{text}: {reason}"))?;
@@ -169,8 +168,7 @@ impl Pins {
             }
             let names: Vec<&str> = self.inputs.iter().map(|pin| &*pin.name).collect();
             let shorts = self.inputs.iter().filter_map(|pin| pin.short.as_deref());
-            let near = nearest(name, names.iter().copied().chain(shorts));
-            let near = near.map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
+            let near = suggest(name, names.iter().copied().chain(shorts));
             format!("no input pin `{name}`{near}; there are {}", names.join(", "))
         })
     }
