@@ -133,14 +133,14 @@ pub(crate) struct Block {
     /// Stalls that each run adds to the statistics.
     stalls: Box<[(BundleAddress, Cause, u32)]>,
     operations: Box<[(Op, u32)]>,
-    /// Cycles of waiting for the front end before the entry, by the bundle that redirected.
-    entered: Vec<(BundleAddress, u64)>,
+    /// Cycles of waiting for the front end before the entry, by the bundle that redirected (`None`: reset).
+    entered: Vec<(Option<BundleAddress>, u64)>,
 }
 
 impl Block {
-    /// Charges cycles before the entry to the front end, refilling after bundle `from`.
+    /// Charges cycles before the entry to the front end, refilling after bundle `from`, or filling after reset.
     #[inline]
-    pub(crate) fn enter(&mut self, from: BundleAddress, cycles: u64) {
+    pub(crate) fn enter(&mut self, from: Option<BundleAddress>, cycles: u64) {
         if cycles == 0 {
             return;
         }

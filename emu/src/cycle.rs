@@ -198,7 +198,7 @@ impl Emulator {
 
     /// Continues at a bundle, without a back edge: if the bundle is the head of a counted loop, this is the first iteration of a run.
     pub(crate) fn continue_at(&mut self, next: BundleAddress, delivered: Cycle, from: BundleAddress) {
-        (self.front.next, self.front.delivered, self.front.from) = (next, delivered, from);
+        (self.front.next, self.front.delivered, self.front.from) = (next, delivered, Some(from));
         if let Some(head) = self.code.head(next) {
             let turns = &mut self.turns[head];
             (turns.run, turns.section) = (1, turns.section.saturating_add(1));

@@ -115,8 +115,8 @@ pub struct PredictedIssue {
     pub address: BundleAddress,
     /// First cycle in which the front end delivers the bundle.
     pub delivered: Cycle,
-    /// Bundle that redirected the fetch; the cycles before `delivered` are charged to it.
-    pub from: BundleAddress,
+    /// Bundle that redirected the fetch, `None` after reset; the cycles before `delivered` are charged to it.
+    pub from: Option<BundleAddress>,
     /// Cycle of issue, and the stalls from `delivered` on.
     pub issue: Issue,
 }
@@ -143,14 +143,14 @@ pub(crate) struct Front {
     pub(crate) next: BundleAddress,
     /// First cycle in which the bundle may issue.
     pub(crate) delivered: Cycle,
-    /// Bundle that redirected the fetch.
-    pub(crate) from: BundleAddress,
+    /// Bundle that redirected the fetch; `None` after reset.
+    pub(crate) from: Option<BundleAddress>,
 }
 
 impl Front {
     fn after_reset(program: &Program) -> Front {
         let (next, delivered) = (BundleAddress::RESET, timing::after_reset(program.machine));
-        Front { next, delivered, from: next }
+        Front { next, delivered, from: None }
     }
 }
 
@@ -601,7 +601,7 @@ impl Emulator {
     pub fn last_issued(&self) -> Option<BundleAddress> {
         match self.status {
             Status::Waiting { address, .. } | Status::Halted { address, .. } => Some(address),
-            _ => self.has_issued().then_some(self.front.from),
+            _ => self.front.from.filter(|_| self.has_issued()),
         }
     }
 

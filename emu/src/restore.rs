@@ -132,7 +132,7 @@ impl Emulator {
 
     /// The machine waits since a cycle, with nothing in flight and every unit free.
     fn wait_since(&mut self, since: Cycle, address: BundleAddress, target: BundleAddress) {
-        self.front = Front { next: target, delivered: 0, from: address };
+        self.front = Front { next: target, delivered: 0, from: Some(address) };
         self.status = Status::Waiting { since, address };
         self.recent = Recent::List(Vec::new());
         self.scoreboard = None;
@@ -170,7 +170,7 @@ impl Emulator {
                 self.wait_since(0, address, target);
             }
             Position::Stopped(address) => {
-                self.front = Front { next: address, delivered: 0, from: address };
+                self.front = Front { next: address, delivered: 0, from: Some(address) };
                 self.status = Status::Halted { cycle: 0, address };
                 self.now = 1;
             }

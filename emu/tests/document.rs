@@ -102,7 +102,9 @@ const EXAMPLES: &[Example] = &[
 
 fn describe(program: &Program, cause: Cause) -> String {
     match cause {
-        Cause::Branch { from } => format!("front end, after bundle {from}"),
+        Cause::Branch { from } => {
+            format!("front end, after {}", from.map_or("reset".to_owned(), |from| format!("bundle {from}")))
+        }
         Cause::Operand { register, producer } => {
             format!("operand {} of bundle {producer}", program.register_text(register))
         }

@@ -38,7 +38,7 @@ fn run(program: &Program) -> (Vec<(BundleAddress, u64)>, Stalls) {
     let statistics = stepper.statistics();
     assert_eq!(statistics.cycles, statistics.bundles + statistics.stalled());
     let mut causes = statistics.causes;
-    assert_eq!(causes.remove(&(at(0), Cause::Branch { from: at(0) })), Some(reset), "the refill after reset");
+    assert_eq!(causes.remove(&(at(0), Cause::Branch { from: None })), Some(reset), "the refill after reset");
     (issues, causes)
 }
 
@@ -125,7 +125,7 @@ fn the_last_operand_is_charged() {
          jmp 4
          nop",
         &[0, 1, last, last + 1, last + 2 + u64::from(F3.refill)],
-        &[((at(2), cause), last - 2), ((at(4), Cause::Branch { from: at(3) }), F3.refill.into())],
+        &[((at(2), cause), last - 2), ((at(4), Cause::Branch { from: Some(at(3)) }), F3.refill.into())],
     );
 }
 
@@ -310,7 +310,7 @@ fn a_jump_refills() {
              on: nop
                  halt",
             &[0, 1 + taken, 2 + taken],
-            &[((at(2), Cause::Branch { from: at(0) }), taken)],
+            &[((at(2), Cause::Branch { from: Some(at(0)) }), taken)],
         );
     }
 }
@@ -351,7 +351,7 @@ fn branches_are_taken_by_all_32_bits() {
                 vec![(at(0), 0), (at(1), 1 + resolve), (at(2), 2 + resolve)]
             };
             assert_eq!(issues, expected, "{} {op} {input:#x}", machine.name);
-            let stalls = emulator.statistics().stalls()[Cause::Branch { from: at(0) }.kind()];
+            let stalls = emulator.statistics().stalls()[Cause::Branch { from: Some(at(0)) }.kind()];
             assert_eq!(stalls, refill + if taken { refill } else { resolve });
         }
     }
@@ -570,7 +570,8 @@ fn a_wait_ends_with_the_tick() {
             let waiting = if missed(tick) { 0 } else { tick - waited };
             assert_eq!(statistics.causes.get(&(at(0), Cause::Wait)).copied().unwrap_or(0), waiting);
             let refilling = issue - waited - 1 - waiting;
-            let branch = statistics.causes.get(&(at(1), Cause::Branch { from: at(0) })).copied().unwrap_or(0);
+            let branch =
+                statistics.causes.get(&(at(1), Cause::Branch { from: Some(at(0)) })).copied().unwrap_or(0);
             assert_eq!(branch, refilling, "tick {tick}");
         }
     }

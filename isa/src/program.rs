@@ -462,11 +462,6 @@ impl Program {
         Some(SlotIndex::all().zip(self.words(address)?).map(decode).collect())
     }
 
-    /// A bundle has an instruction after which execution may continue elsewhere.
-    fn redirects(&self, address: BundleAddress) -> bool {
-        self.bundle(address).and_then(Result::ok).is_some_and(|bundle| Flow::of(&bundle) != Flow::Next)
-    }
-
     /// The addresses of the program's bundles, ascending.
     pub fn addresses(&self) -> impl DoubleEndedIterator<Item = BundleAddress> + Clone + use<> {
         BundleAddress::RESET.until(BundleAddress::new(self.bundles()))
@@ -567,10 +562,10 @@ impl Program {
     /// The cause of a cycle without issue, in words.
     pub fn cause_text(&self, cause: Cause) -> String {
         match cause {
-            Cause::Branch { from } if from == BundleAddress::RESET && !self.redirects(from) => {
-                "front end fills after reset".to_owned()
+            Cause::Branch { from: None } => "front end fills after reset".to_owned(),
+            Cause::Branch { from: Some(from) } => {
+                format!("front end refills after {}", self.bundle_text(from))
             }
-            Cause::Branch { from } => format!("front end refills after {}", self.bundle_text(from)),
             Cause::Operand { register, producer } => {
                 format!("awaits {} from {}", self.register_text(register), self.bundle_text(producer))
             }

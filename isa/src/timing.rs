@@ -73,8 +73,8 @@ impl Span {
 pub enum Cause {
     /// The front end refills after a redirection or decides a conditional branch.
     Branch {
-        /// The bundle that redirected (0 after reset).
-        from: BundleAddress,
+        /// The bundle that redirected; `None` after reset.
+        from: Option<BundleAddress>,
     },
     /// A source is not ready.
     Operand {

@@ -505,6 +505,22 @@ directives! {
     Raw ".raw" "slot 0x…" "48 bits for a slot, whatever they mean.";
 }
 
+impl Directive {
+    /// Words with a meaning of their own among the operands.
+    pub const fn options(self) -> &'static [&'static str] {
+        match self {
+            Directive::Machine => &["code", "data"],
+            Directive::Param => &["range"],
+            Directive::For => &["step", "unroll", "max"],
+            Directive::LoopBound => &["total"],
+            Directive::Schedule | Directive::Contract => &["on", "off"],
+            Directive::Fast => &["reassociate", "reciprocal", "off"],
+            Directive::Ports => &["latched", "direct"],
+            _ => &[],
+        }
+    }
+}
+
 /// A source file as a tree, in flat lists.
 #[derive(Clone, Default, Debug)]
 pub struct Ast {

@@ -182,7 +182,7 @@ impl<'p> Picture<'p> {
         let stall = |(cause, cycles): &(Cause, u32)| {
             let producer = match *cause {
                 Cause::Operand { producer, .. } | Cause::Destination { producer, .. } => Some(producer),
-                Cause::Branch { from } => Some(from),
+                Cause::Branch { from } => from,
                 _ => None,
             };
             json!({

@@ -13,6 +13,7 @@ use std::io::Write;
 use std::process::ExitCode;
 use terminal::files::Out;
 use terminal::groups;
+use terminal::interrupt;
 use terminal::output::{self, Color, Failure};
 use terminal::page::Page;
 use terminal::suggest;
@@ -35,7 +36,8 @@ struct Arguments {
 const AFTER_HELP: &str = "\
 Results go to standard output, messages to standard error. \
 Exit status: 0 success; 1 an error in a file or while running, or a check failed (`bound --deadline`, `cosim`, \
-`verify`, a `check` of `debug`); 2 an error in the command line; 3 something that --deny names happened in a run.
+`verify`, a `check` of `debug`); 2 an error in the command line; 3 something that --deny names happened in a run; \
+130 ended by Ctrl-C.
 
 Examples:
   takt track                         the main job: cycles, accuracy, tracking error
@@ -187,12 +189,15 @@ fn end(result: Result<()>, color: bool) -> ExitCode {
     let failure = error.downcast_ref::<Failure>();
     match failure {
         Some(Failure::Reported) => {}
-        Some(Failure::Diagnostics(text)) => output::message(text),
+        Some(Failure::Diagnostics(text) | Failure::Interrupted(text)) => output::message(text),
         Some(Failure::Denied(messages)) => messages.iter().for_each(|text| output::error(text, color)),
         Some(Failure::Usage(_)) | None => match machine_mistake::of(&error) {
             Some(mistake) => output::message(&mistake.render(color)),
             None => output::error(&takt_diagnostics::describe(error.as_ref()), color),
         },
+    }
+    if let Some(Failure::Interrupted(_)) = failure {
+        interrupt::end();
     }
     ExitCode::from(match failure {
         Some(Failure::Usage(_)) => 2,

@@ -39,9 +39,9 @@ fn helix_builds_the_grammar_from_a_folder_that_is_there() {
 }
 
 /// Source with words of every kind.
-const COLOURED: &str = "; fadd 1\n.include <math.s>\nlaw: fadd u, e, 0x1f\n u = sat(sin(2.5e-3*pi), fold)\n.error \"fadd\"\n.const gain = 2\n";
+const COLOURED: &str = "; fadd 1\n.include <math.s>\nlaw: fadd u, e, 0x1f\n u = sat(sin(2.5e-3*pi), fold)\n.error \"fadd\"\n.const gain = 2\n.param kp = 1 range 0..40\n.schedule on\n wait law\n bz e, law\n.for i, 0, 3 step 1\n";
 /// Line and column from 1 of the first letter of words, the group of each in Vim, and the face in Emacs.
-const COLOURS: [(usize, usize, &str, &str); 12] = [
+const COLOURS: [(usize, usize, &str, &str); 21] = [
     (1, 3, "taktComment", "font-lock-comment-face"),
     (2, 1, "taktDirective", "font-lock-preprocessor-face"),
     (2, 10, "taktFile", "font-lock-string-face"),
@@ -54,6 +54,15 @@ const COLOURS: [(usize, usize, &str, &str); 12] = [
     (4, 21, "taktConstant", "font-lock-constant-face"),
     (5, 9, "taktText", "font-lock-string-face"),
     (6, 8, "taktName", "font-lock-variable-name-face"),
+    (7, 8, "taktName", "font-lock-variable-name-face"),
+    (7, 15, "taktOption", "font-lock-keyword-face"),
+    (7, 21, "taktNumber", "font-lock-constant-face"),
+    (7, 24, "taktNumber", "font-lock-constant-face"),
+    (8, 11, "taktOption", "font-lock-keyword-face"),
+    (9, 7, "taktLabel", "font-lock-constant-face"),
+    (10, 5, "", "nil"),
+    (10, 8, "taktLabel", "font-lock-constant-face"),
+    (11, 14, "taktOption", "font-lock-keyword-face"),
 ];
 
 fn said(command: &mut Command) -> String {

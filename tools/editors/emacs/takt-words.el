@@ -20,5 +20,13 @@
   '(".const" ".param" ".input" ".output" ".state" ".reg" ".array")
   "Directives that declare names.")
 
+(defconst takt-to-labels
+  '("jmp" "bz" "bnz" "call" "wait" "loop")
+  "Names of instructions with a label among the operands.")
+
+(defconst takt-options
+  '((".machine" "code" "data") (".param" "range") (".for" "step" "unroll" "max") (".schedule" "on" "off") (".contract" "on" "off") (".fast" "reassociate" "reciprocal" "off") (".ports" "latched" "direct") (".loop_bound" "total"))
+  "Directives with words of their own, and these.")
+
 (provide 'takt-words)
 ;;; takt-words.el ends here

@@ -31,11 +31,19 @@
   `(("\\.include[ \t]*\\(<[^>\n]*>\\)" 1 font-lock-string-face)
     ("^[ \t]*\\([[:alpha:]_][[:alnum:]_.{}]*\\):" 1 font-lock-constant-face)
     (,(regexp-opt takt-directives 'symbols) . font-lock-preprocessor-face)
+    (,(concat (regexp-opt takt-to-labels 'symbols) "[ \t]+\\(?:[[:alnum:]_.]+[ \t]*,[ \t]*\\)?\\([[:alpha:]_][[:alnum:]_.]*\\)")
+     2 font-lock-constant-face)
     (,(regexp-opt takt-mnemonics 'symbols) . font-lock-keyword-face)
+    ,@(mapcar (lambda (row)
+                `(,(concat "^[ \t]*" (regexp-quote (car row)) "\\_>[^;\n]*?" (regexp-opt (cdr row) 'symbols)) 1 font-lock-keyword-face))
+              takt-options)
     ("\\_<\\([[:alpha:]_][[:alnum:]_.]*\\)(" 1 font-lock-function-name-face)
     (,(concat "^[ \t]*" (regexp-opt takt-declaring) "[ \t]+\\([^;=\n]*\\)") 1 font-lock-variable-name-face)
     (,(regexp-opt takt-constants 'symbols) . font-lock-constant-face)
-    ("\\_<\\(?:0[xX][[:xdigit:]_]+\\|0[bB][01_]+\\|[0-9][0-9_]*\\(?:\\.[0-9_]*\\)?\\(?:[eE][-+]?[0-9]+\\)?\\)\\_>" . font-lock-constant-face))
+    ("\\_<\\(?:0[xX][[:xdigit:]_]+\\|0[bB][01_]+\\|[0-9][0-9_]*\\(?:\\.[0-9_]*\\)?\\(?:[eE][-+]?[0-9]+\\)?\\)\\_>" .
+     font-lock-constant-face)
+    ("\\_<\\([0-9][0-9_]*\\)\\.\\." 1 font-lock-constant-face)
+    ("\\.\\.[ \t]*-?\\([0-9][0-9_]*\\(?:\\.[0-9_]*\\)?\\(?:[eE][-+]?[0-9]+\\)?\\)\\_>" 1 font-lock-constant-face))
   "Colours of Takt's sources.")
 
 ;;;###autoload

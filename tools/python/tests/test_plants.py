@@ -169,7 +169,7 @@ def test_results_and_pictures(tmp_path):
     told = json.loads(ran.stdout)
     assert told["plant"]["name"] == "dc_motor" and set(told["plant"]["states"]) == {"i", "w", "angle"}
     svg = picture.read_text()
-    assert svg.startswith("<svg") and all(title in svg for title in ("w_ref", "dc_motor.i", "time, s"))
+    assert svg.startswith("<svg") and all(title in svg for title in ("w_ref", "dc_motor.i", "time, ms"))
 
 
 @pytest.mark.parametrize(("arguments", "status", "message"), [

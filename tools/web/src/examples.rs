@@ -11,6 +11,8 @@ use takt_programs::{EXAMPLES, SOURCES, title};
 /// Data of an example besides the text of its source.
 struct KnownExample {
     name: &'static str,
+    /// Heading in the menu of examples; those of a group stand one after another.
+    group: &'static str,
     /// Title in the menu of examples, where a sentence would not fit.
     short: &'static str,
     /// Reader that it is for, and a thing to try; `docs/examples.md` has the same words.
@@ -40,6 +42,7 @@ struct Solves {
 /// Values of the fields that most examples leave out.
 const PLAIN: KnownExample = KnownExample {
     name: "",
+    group: "",
     short: "",
     text: "",
     plant: None,
@@ -56,30 +59,30 @@ const MOTOR: KnownExample = KnownExample { plant: Some("dc_motor"), periods: Som
 /// Examples in the order of the menu; the page opens on the first, which is the README's.
 #[rustfmt::skip]
 const KNOWN: [KnownExample; 12] = [
-    KnownExample { name: "gains.s", short: "motor speed, equations",
+    KnownExample { name: "gains.s", group: "Motors", short: "motor speed, equations",
         text: "For makers of speed controllers. Try ki at 20, and the speed overshoots; with \"set from period\" 200, only from there on.", ..MOTOR },
-    KnownExample { name: "pi.s", short: "motor speed, PI",
+    KnownExample { name: "pi.s", group: "Motors", short: "motor speed, PI",
         text: "For those whose gains are fixed. Try KP at 0.3, and the speed overshoots; at 1.6, it arrives too late.", ..MOTOR },
-    KnownExample { name: "tracking.s", short: "five-axis robot",
-        text: "For makers of robots. Try the tab Robot, where it follows its path, and the tab Pipeline, with each cycle of a period.", seconds: Some(3), ..PLAIN },
-    KnownExample { name: "pendulum.s", short: "pendulum on a cart",
-        text: "For makers of machines that balance. Try KA at 15, and the pendulum swings ever further.", plant: Some("cart_pendulum"), periods: Some(6000), plotted: Some(&["force", "angle", "x", "x_ref"]), ..PLAIN },
-    KnownExample { name: "foc.s", short: "motor current",
+    KnownExample { name: "foc.s", group: "Motors", short: "motor current",
         text: "For makers of motor drives. Try wc at 1500, and the currents follow more slowly.", ..CONTROL },
-    KnownExample { name: "blink.s", short: "blinking lamp",
-        text: "For a first look. Try SECONDS at 0.1, and the lamp blinks five times as fast.", periods: Some(2000), ..PLAIN },
-    KnownExample { name: "biquads.s", short: "low-pass filter",
-        text: "For those who filter a measurement. Try FC at 100, and the curve is smoother and later.", plotted: Some(&["x", "y"]), ..PLAIN },
-    KnownExample { name: "foc_early.s", short: "motor current, early",
+    KnownExample { name: "foc_early.s", group: "Motors", short: "motor current, early",
         text: "For drives whose duties must be out early. Try the tab Code: what follows the duties is for the next period.", ..CONTROL },
-    KnownExample { name: "kalman.s", short: "Kalman filter",
-        text: "For those who estimate a speed from positions. Try P0 at 0, and the filter takes longer to find it.", ..PLAIN },
-    KnownExample { name: "lu.s", short: "linear equations",
-        text: "For those who solve equations in each period. Try the tab Pipeline: one straight line, whatever the matrix.", solves: Some(Solves { matrix: "A", solution: "x", right: "b", singular: "singular" }), ..PLAIN },
-    KnownExample { name: "statespace.s", short: "six masses, state space",
+    KnownExample { name: "tracking.s", group: "Robots and machines", short: "five-axis robot",
+        text: "For makers of robots. Try the tab Robot, where it follows its path, and the tab Pipeline, with each cycle of a period.", seconds: Some(3), ..PLAIN },
+    KnownExample { name: "pendulum.s", group: "Robots and machines", short: "pendulum on a cart",
+        text: "For makers of machines that balance. Try KA at 15, and the pendulum swings ever further.", plant: Some("cart_pendulum"), periods: Some(6000), plotted: Some(&["force", "angle", "x", "x_ref"]), ..PLAIN },
+    KnownExample { name: "statespace.s", group: "Robots and machines", short: "six masses, state space",
         text: "For controllers of many states. Try the tab Pipeline, beside \"on t4\": a third fewer cycles.", seconds: Some(2), ..PLAIN },
-    KnownExample { name: "table.s", short: "thermistor, table",
+    KnownExample { name: "biquads.s", group: "Signals", short: "low-pass filter",
+        text: "For those who filter a measurement. Try FC at 100, and the curve is smoother and later.", plotted: Some(&["x", "y"]), ..PLAIN },
+    KnownExample { name: "kalman.s", group: "Signals", short: "Kalman filter",
+        text: "For those who estimate a speed from positions. Try P0 at 0, and the filter takes longer to find it.", ..PLAIN },
+    KnownExample { name: "table.s", group: "Signals", short: "thermistor, table",
         text: "For those who read a sensor that is not linear. Try B at 3000, and a volt is more degrees.", ..PLAIN },
+    KnownExample { name: "blink.s", group: "First steps, and mathematics", short: "blinking lamp",
+        text: "For a first look. Try SECONDS at 0.1, and the lamp blinks five times as fast.", periods: Some(2000), ..PLAIN },
+    KnownExample { name: "lu.s", group: "First steps, and mathematics", short: "linear equations",
+        text: "For those who solve equations in each period. Try the tab Pipeline: one straight line, whatever the matrix.", solves: Some(Solves { matrix: "A", solution: "x", right: "b", singular: "singular" }), ..PLAIN },
 ];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
@@ -126,7 +129,7 @@ impl KnownExample {
         let solves =
             self.solves.as_ref().map(|ports| [ports.matrix, ports.solution, ports.right, ports.singular]);
         Some(json!({
-            "name": self.name, "title": title(source), "short": self.short, "text": self.text, "source": source, "inputs": inputs,
+            "name": self.name, "title": title(source), "group": self.group, "short": self.short, "text": self.text, "source": source, "inputs": inputs,
             "periods": self.periods, "seconds": self.seconds, "plotted": self.plotted, "track": is_track,
             "plant": self.plant.map(|plant| json!({ "name": plant })),
             "points": solves.is_some(), "residual": solves,

@@ -230,7 +230,12 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
         all: Vec::new(),
     };
     search.run(start, color)?;
-    search.report(out)
+    search.report(out)?;
+    if is_stopped() {
+        out.flush()?;
+        return Err(stopped());
+    }
+    Ok(())
 }
 
 impl Search<'_> {
@@ -247,6 +252,9 @@ impl Search<'_> {
                 self.evaluate(least)?
             }
         };
+        if begun.is_empty() && is_stopped() {
+            return Err(stopped());
+        }
         if begun.is_empty() {
             return Err(self.misfit(start[0], color));
         }
@@ -404,8 +412,8 @@ impl Search<'_> {
             }
             return files::json(&result, out);
         }
-        if is_stopped() {
-            message("stopped; the same command goes on from here\n");
+        if front.is_empty() && is_stopped() {
+            return Err(stopped());
         }
         if front.is_empty() {
             let [luts, flip_flops, ram, multipliers, cycles] = self.least.unwrap_or_default();
@@ -543,6 +551,11 @@ fn cycles(arguments: &Explore, (path, bytes): &(&Path, Vec<u8>), machine: &'stat
 
 fn is_stopped() -> bool {
     STOPPED.load(Ordering::Relaxed)
+}
+
+/// The error after Ctrl-C.
+fn stopped() -> anyhow::Error {
+    Failure::Interrupted("stopped; the same command goes on from here".to_owned()).into()
 }
 
 /// Prints the relative errors of the estimates for placed and routed machines.

@@ -8,9 +8,10 @@ use crate::run::workers::{self, WorkArguments, Workers};
 use crate::terminal::files::{self, Out};
 use crate::terminal::interrupt;
 use crate::terminal::number;
+use crate::terminal::output::Failure;
 use crate::terminal::plot;
 use crate::terminal::progress::progress;
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -194,11 +195,9 @@ impl<'a> MonteCarlo<'a> {
         let groups =
             workers.results(&units, &STOPPED, &mut |count| bar.inc(count * ROBOTS * self.periods))?;
         if groups.len() < units.len() {
-            bail!(
-                "interrupted after {} of {} units; the same command goes on from here",
-                groups.len(),
-                units.len()
-            );
+            let (done, all) = (groups.len(), units.len());
+            let text = format!("interrupted after {done} of {all} units; the same command goes on from here");
+            return Err(Failure::Interrupted(text).into());
         }
         Ok(joined(groups))
     }

@@ -49,50 +49,56 @@ use takt_system::CorePeriods;
 pub(crate) struct Run {
     /// Source or image, `-` being standard input; or a system, a `.toml` file.
     file: PathBuf,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "The program")]
     machine: OptionalMachine,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "The program")]
     source: SourceArguments,
     /// CSV with one named column for each input port and one row for each period; other columns are ignored; `-` is standard input.
-    #[arg(long, value_name = "CSV")]
+    #[arg(long, value_name = "CSV", help_heading = INPUTS)]
     inputs: Option<PathBuf>,
     /// Many runs of the program at once, on all cores: a folder with a CSV of inputs for each run, or one CSV with a column
     /// `run`. --outputs gets that column too.
     #[arg(
         long,
         value_name = "DIR|CSV",
+        help_heading = INPUTS,
         conflicts_with_all = ["inputs", "periods", "plant", "trace", "deny", "stats"]
     )]
     batch: Option<PathBuf>,
     /// Run at most this many periods.
-    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true, help_heading = LENGTH)]
     periods: Option<u64>,
     /// Stop with an error after this many cycles, with --batch each run [default: 1000000000 in any one period].
-    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true, help_heading = LENGTH)]
     max_cycles: Option<u64>,
     /// Cycles from tick to tick, up to 100000000 [default: the tick comes when the program is ready].
-    #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true)]
+    #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true, help_heading = LENGTH)]
     tick: Option<NonZeroU64>,
     /// Also show these words of data memory, as they are when a period ends: all elements of an array, `P`, or one, `P[2,3]`, with indices
     /// from 1; of a label all words up to the next one, `table`, or one, `table[3]`, from 0, as floating-point numbers. May be given
     /// several times.
-    #[arg(long, value_name = "NAME", conflicts_with = "batch")]
+    #[arg(long, value_name = "NAME", conflicts_with = "batch", help_heading = RESULTS)]
     memory: Vec<String>,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = INPUTS)]
     parameters: ParameterArguments,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "A closed loop")]
     plant: PlantArguments,
     /// Draw the columns of the table of --outputs over time, as SVG: the output ports; with --plant, the input ports and the plant's states,
     /// too. The input ports of --inputs are drawn as well.
-    #[arg(long, value_name = "SVG", conflicts_with = "batch")]
+    #[arg(long, value_name = "SVG", conflicts_with = "batch", help_heading = RESULTS)]
     plot: Option<PathBuf>,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = RESULTS)]
     trace: TraceArguments,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = RESULTS)]
     deny: DenyArguments,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = RESULTS)]
     shown: OutcomeOptions,
 }
+
+// Groups of options in the help.
+const INPUTS: &str = "Inputs";
+const LENGTH: &str = "Length and tick";
+const RESULTS: &str = "Results";
 
 const EXAMPLES: &str = "\
 Examples:

@@ -117,7 +117,8 @@ impl Verify {
         let bar = DelayedProgress::new(Some(units.len() as u64), "images");
         let results = workers.results(&units, &STOPPED, &mut |count| bar.add(count))?;
         if results.len() < units.len() {
-            bail!("interrupted after {} of {} images", results.len(), units.len());
+            let text = format!("interrupted after {} of {} images", results.len(), units.len());
+            return Err(Failure::Interrupted(text).into());
         }
         Ok(results)
     }

@@ -79,6 +79,8 @@ pub(crate) enum Failure {
     Usage(String),
     /// Events denied by --deny, one message each.
     Denied(Vec<String>),
+    /// Ctrl-C ended the work before all of it was done; the message says how much was.
+    Interrupted(String),
     /// Failure that the results already report.
     Reported,
 }
@@ -86,7 +88,9 @@ pub(crate) enum Failure {
 impl std::fmt::Display for Failure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Failure::Diagnostics(text) | Failure::Usage(text) => f.write_str(text),
+            Failure::Diagnostics(text) | Failure::Usage(text) | Failure::Interrupted(text) => {
+                f.write_str(text)
+            }
             Failure::Denied(messages) => f.write_str(&messages.join("\n")),
             Failure::Reported => Ok(()),
         }

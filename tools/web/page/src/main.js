@@ -958,7 +958,12 @@ async function start() {
   state.about = await machine.call("about");
   el("machine").replaceChildren(...state.about.machines.map(({ name, text }) => new Option(name, name)), new Option("own…", OWN));
   el("machine").value = "t3";
-  el("example").replaceChildren(new Option("open one …", ""), ...state.about.examples.map(({ name, short, title }) => Object.assign(new Option(`${name}: ${short}`, name), { title })));
+  const groups = Map.groupBy(state.about.examples, ({ group }) => group), entry = ({ name, short, title }) => Object.assign(new Option(`${name}: ${short}`, name), { title });
+  el("example").replaceChildren(new Option("open one …", ""), ...[...groups].map(([label, examples]) => {
+    const group = Object.assign(document.createElement("optgroup"), { label });
+    group.append(...examples.map(entry));
+    return group;
+  }));
   rows("keytable", [...KEYS.map(([key, what]) => [key.replace("Mod", "Ctrl"), what]), ...EDITOR_KEYS]);
 
   document.addEventListener("keydown", pressed, true);
