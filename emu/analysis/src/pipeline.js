@@ -282,6 +282,8 @@ export class Pipeline {
       this.follows = true;
       this.fits = "new";
       this.at = undefined;
+      // A longer picture needs the room that a short one left to the stalls.
+      if (this.opened) this.stalls.open = this.opened = false;
     }
     this.resize();
   }
@@ -379,7 +381,7 @@ export class Pipeline {
     this.width = Math.min(most, Math.max(least, (scroll.clientWidth - this.labelWidth - 4 * GAP) / Math.max(1, this.columns)));
     this.row = Math.floor(Math.min(TALL, Math.max(ROW, (scroll.clientHeight - AXIS - 8) / Math.max(1, this.rows.length))));
     // Where the rows leave room, the stalls have it.
-    if (this.fits === "new" && scroll.clientHeight - AXIS - this.rows.length * this.row > ROOM) this.stalls.open = true;
+    if (this.fits === "new" && this.rows.length && !this.stalls.open && scroll.clientHeight - AXIS - this.rows.length * this.row > ROOM) this.stalls.open = this.opened = true;
     this.parent.style.setProperty("--row", `${this.row}px`);
     sizer.style.width = `${this.labelWidth + this.columns * this.width + 24}px`;
     sizer.style.height = `${AXIS + this.rows.length * this.row + 8}px`;

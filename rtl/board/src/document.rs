@@ -295,7 +295,15 @@ fn number(value: &DeValue<'_>) -> Option<f64> {
 fn written(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("\"{}\"", text.chars().take(40).collect::<String>()),
-        DeValue::Integer(integer) => integer.as_str().to_owned(),
+        DeValue::Integer(integer) => {
+            let prefix = match integer.radix() {
+                2 => "0b",
+                8 => "0o",
+                16 => "0x",
+                _ => "",
+            };
+            format!("{prefix}{}", integer.as_str())
+        }
         DeValue::Float(float) => float.as_str().to_owned(),
         DeValue::Boolean(truth) => truth.to_string(),
         other => format!("a {}", other.type_str()),

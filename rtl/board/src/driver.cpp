@@ -62,6 +62,83 @@ static uint32_t chance() {
 
 static bool word(uint32_t &value) { return fread(&value, sizeof value, 1, stdin) == 1; }
 
+#ifdef FLASH_SELECT
+// A flash, in the file flash.bin of the working folder: reading, programming, erasing of 4 kB, identification, status. After as many
+// changes of bytes as the file flash.life says, its power goes: nothing changes any more.
+struct Flash {
+    std::FILE *file = nullptr;
+    std::vector<uint8_t> bytes = std::vector<uint8_t>(1 << 24, 0xff);
+    uint64_t life = ~uint64_t(0);
+    uint32_t busy = 0, bits = 0, count = 0, shift = 0, out = 0xff;
+    uint32_t address = 0;
+    uint8_t command = 0;
+    bool clock = false, enabled = false, drives = true;
+    std::vector<uint8_t> data;
+
+    void open(const char *name) {
+        file = std::fopen(name, "r+b");
+        if (!file) file = std::fopen(name, "w+b");
+        if (file) (void)!std::fread(bytes.data(), 1, bytes.size(), file);
+    }
+    void put(uint32_t at, uint8_t value) {
+        if (life == 0) return;
+        life--;
+        at &= (1 << 24) - 1;
+        bytes[at] = value;
+        if (!file) return;
+        // Bytes before the file's end that were never written are erased ones.
+        std::fseek(file, 0, SEEK_END);
+        for (long end = std::ftell(file); end < long(at); end++) std::fputc(bytes[end], file);
+        std::fseek(file, at, SEEK_SET);
+        std::fputc(value, file);
+    }
+    void act() {
+        if (command == 0x06) enabled = true;
+        if (count < 4 || !enabled || (command != 0x02 && command != 0x20)) return;
+        enabled = false;
+        busy = 3000;
+        if (command == 0x02)
+            for (std::size_t i = 0; i < data.size(); i++) {
+                uint32_t at = (address & ~255u) | (uint32_t(address + i) & 255);
+                put(at, bytes[at] & data[i]);
+            }
+        else
+            for (uint32_t i = 0; i < 4096; i++) put((address & ~4095u) + i, 0xff);
+        if (file) std::fflush(file);
+    }
+    uint8_t answer() {
+        if (command == 0x05) return uint8_t((busy > 0) | enabled << 1);
+        if (busy) return 0xff;
+        if (command == 0x9f) return count == 1 ? 0xef : count == 2 ? 0x40 : 0x18;
+        if (command == 0x03 && count >= 4) return bytes[(address + count - 4) & ((1 << 24) - 1)];
+        return 0xff;
+    }
+    // A cycle: levels of the pins, and the level that the flash drives.
+    uint8_t cycle(bool select, bool next, bool in) {
+        if (busy) busy--;
+        if (select) {
+            if (count && !busy) act();
+            bits = count = 0;
+            data.clear();
+        } else if (next && !clock) {
+            shift = shift << 1 | in;
+            if (++bits == 8) {
+                uint8_t byte = uint8_t(shift);
+                if (count == 0) command = byte;
+                else if (count < 4) address = (address << 8 | byte) & 0xffffff;
+                else if (command == 0x02) data.push_back(byte);
+                bits = 0;
+                count++;
+                out = answer();
+            }
+        }
+        if (!next && clock) drives = out >> (7 - bits) & 1;
+        clock = next;
+        return drives;
+    }
+};
+#endif
+
 struct Encoder {
     uint32_t a, b, count;
     int32_t difference;
@@ -78,6 +155,15 @@ int main(int argc, char **argv) {
     output_pins(&top, outputs);
     top.clk_in = 0;
     to_board(top, 1);
+#ifdef FLASH_SELECT
+    Flash flash;
+    if (std::FILE *life = std::fopen("flash.life", "r")) {
+        unsigned long long bytes;
+        if (std::fscanf(life, "%llu", &bytes) == 1) flash.life = bytes;
+        std::fclose(life);
+    }
+    flash.open("flash.bin");
+#endif
     std::deque<uint32_t> sends;
     uint32_t shift = 0, bits = 0, left = 0;              // what is being sent to the board
     uint32_t got = 0, got_bits = 0, got_left = 0;        // what comes from it
@@ -139,6 +225,9 @@ int main(int argc, char **argv) {
                 bits = 10;
                 left = DIVIDE;
             }
+#ifdef FLASH_SELECT
+            *inputs[FLASH_IN] = flash.cycle(*outputs[FLASH_SELECT], *outputs[FLASH_CLOCK], *outputs[FLASH_OUT]);
+#endif
             to_board(top, bits ? shift & 1 : 1);
             if (bits && --left == 0) {
                 shift >>= 1;

@@ -14,6 +14,7 @@ pub mod device;
 mod document;
 pub mod emulated;
 pub mod endpoints;
+pub mod flash;
 pub mod host;
 mod interlock;
 pub mod kind;
@@ -79,6 +80,7 @@ pub const VERILOG: &[(&str, &str)] = &[
     ("takt_trip.v", include_str!("../verilog/takt_trip.v")),
     ("takt_watchdog.v", include_str!("../verilog/takt_watchdog.v")),
     ("takt_clock_watch.v", include_str!("../verilog/takt_clock_watch.v")),
+    ("takt_flash.v", include_str!("../verilog/takt_flash.v")),
     ("takt_uart_receive.v", include_str!("../verilog/takt_uart_receive.v")),
     ("takt_uart_send.v", include_str!("../verilog/takt_uart_send.v")),
 ];

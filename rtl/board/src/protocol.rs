@@ -111,7 +111,7 @@ const fn register(address: u16, name: &'static str, access: &'static str, text: 
 }
 
 /// The board's registers. Generator, host and docs/protocol.md take the registers from this table.
-pub const REGISTERS: [Register; 31] = [
+pub const REGISTERS: [Register; 34] = [
     register(
         0,
         "id",
@@ -161,6 +161,20 @@ pub const REGISTERS: [Register; 31] = [
     register(19, "issued", "r", "15:0 the bundle that issued last, if `observed` is 1"),
     register(20, "trips", "r", "the trips that are held, the wiring's first in bit 0"),
     register(
+        48,
+        "flash",
+        "rw",
+        "bit 0 busy; 3:2 the image that was started, the first in bit 2; 5:4 images that were valid at the reset; 7:6 images that read \
+         otherwise when they were played. Written: 7:0 bytes of the buffer that are sent, 15:8 bytes that are received then",
+    ),
+    register(
+        49,
+        "flash_at",
+        "r",
+        "places of the two images in pages of 256 bytes: 15:0 the first, 31:16 the second",
+    ),
+    register(50, "flash_room", "r", "entries that an image may have; 0: no flash"),
+    register(
         64,
         "scope",
         "r",
@@ -201,6 +215,8 @@ pub const REGISTERS: [Register; 31] = [
     register(73, "scope_last", "r", "the period of the last sample"),
 ];
 
+/// Address of the flash's buffer, of [`WORDS`] words; the registers `flash` to `flash_room` lie behind it.
+pub const FLASH: u16 = 32;
 /// Address of the scope's first register; it has 64 addresses.
 pub const SCOPE: u16 = 64;
 /// The page from which on the ring of the scope is at [`IMAGE`], with this number of words each.

@@ -19,6 +19,8 @@ use takt_rtl::verilator::{Sources, VerilatorError};
 use thiserror::Error;
 
 const DRIVER: &str = include_str!("driver.cpp");
+/// File in a simulation's folder with the contents of the flash; `driver.cpp` names it, too.
+pub const FLASH: &str = "flash.bin";
 
 /// Reason why a board cannot be simulated.
 #[derive(Debug, Error)]
@@ -459,6 +461,21 @@ fn build(
             let _ = writeln!(header, "    *pins++ = &top->{name};");
         }
         let _ = writeln!(header, "    (void)top; (void)pins;\n}}");
+    }
+    let pin = |name: &str, names: &[&String]| names.iter().position(|own| *own == name);
+    if wiring.flash.is_some() {
+        let (inputs, outputs) =
+            (inputs.iter().map(|(name, _)| name).collect::<Vec<_>>(), outputs.iter().collect::<Vec<_>>());
+        let all = [
+            ("SELECT", "select", &outputs),
+            ("CLOCK", "clock", &outputs),
+            ("OUT", "out", &outputs),
+            ("IN", "in", &inputs),
+        ];
+        for (name, own, among) in all {
+            let at = pin(&format!("flash_{own}"), among).unwrap_or_default();
+            let _ = writeln!(header, "#define FLASH_{name} {at}");
+        }
     }
     let watched = watch.map_or_else(|| "#define CORES 0\n#define SEEN 0\n".to_owned(), Watch::header);
     let kept = watch.map_or_else(|| "`verilator_config\n".to_owned(), Watch::configuration);

@@ -9,8 +9,10 @@ use crate::application::Application;
 use crate::boards::Board;
 use crate::carrier::{self, Carrier, CarrierTick, Carriers, Instant};
 use crate::document::{Document, Located, Mistake, Table};
+use crate::flash::{self, Flash};
 use crate::kind::{DIRECT, Direction, KINDS, Kind};
 use crate::scope::{LEAST_DEPTH, MOST_CHANNELS, MOST_DEPTH, MOST_WORDS};
+use crate::top::image;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use takt_isa::Type;
@@ -60,6 +62,8 @@ pub struct Wiring {
     pub carriers: Vec<Carrier>,
     /// The ticks that a carrier gives; `None` if they come every `period` cycles of no carrier.
     pub tick: Option<CarrierTick>,
+    /// The flash with images that a reset starts, if the board has one.
+    pub flash: Option<Flash>,
     /// The scope, if the board has one.
     pub scope: Option<ScopeRequest>,
     /// The peripherals, in the order of the file.
@@ -207,6 +211,7 @@ impl Wiring {
             signals: [const { None }; SIGNALS.len()],
             carriers: Vec::new(),
             tick: None,
+            flash: None,
             scope: None,
             peripherals: Vec::new(),
         }
@@ -232,7 +237,9 @@ impl Wiring {
             let pins = peripheral.kind.pins.iter().zip(&peripheral.pins);
             pins.map(move |(own, at)| (at.as_deref(), || format!("{}.{}", peripheral.name, own.name)))
         });
-        signal.chain(pins.filter(|(at, _)| *at == Some(pin)).map(|(_, name)| name())).next()
+        let flash = self.flash.iter().flat_map(|flash| flash::PINS.iter().zip(&flash.pins));
+        let flash = flash.filter(|(_, at)| *at == pin).map(|((name, _), _)| format!("flash.{name}"));
+        signal.chain(flash).chain(pins.filter(|(at, _)| *at == Some(pin)).map(|(_, name)| name())).next()
     }
 
     /// The peripheral that drives the input port which the host would set at this address, with the register, in words.
@@ -308,6 +315,12 @@ impl Wiring {
                 "this wiring belongs to another {what}: of its {all} ports {missing} are not those of this {what}"
             );
             document.mistake(&(0..0), text);
+        }
+        if let Some(flash) = &self.flash
+            && let Ok(contents) = image(application.clone())
+            && let Some(text) = flash.overlap(contents.room)
+        {
+            document.mistake(&flash.place, text);
         }
         if let Some(scope) = &self.scope {
             let cores = &application.description().cores;
@@ -504,6 +517,7 @@ impl<'a> Reader<'a> {
             }
             table.reject_unknown_keys(&[]);
         }
+        let flash = top.table("flash").and_then(|table| self.flash(&table));
         let scope = top.table("scope").map(|table| self.scope(&table));
         let mut peripherals = Vec::new();
         for (name, table) in top.table("peripheral").iter().flat_map(Table::tables) {
@@ -529,6 +543,7 @@ impl<'a> Reader<'a> {
             signals,
             tick: self.carriers.tick.map(|(tick, _)| tick),
             carriers: self.carriers.all,
+            flash,
             scope,
             peripherals,
         })
@@ -545,7 +560,7 @@ impl<'a> Reader<'a> {
             );
         }
         let is_on = top.boolean("observe").is_some_and(|at| at.value);
-        for key in ["baud", "host", "scope"].into_iter().chain(is_on.then_some("observe")) {
+        for key in ["baud", "host", "flash", "scope"].into_iter().chain(is_on.then_some("observe")) {
             if let Some(place) = top.place_of(key) {
                 let text = format!(
                     "`{key}` is for a host, which `uart = false` leaves out: leave out one of the two"
@@ -568,6 +583,37 @@ impl<'a> Reader<'a> {
             self.document.mistake(&at.place, text);
         }
         true
+    }
+
+    /// The table `[flash]`: pins, and the addresses of the two images.
+    fn flash(&mut self, table: &Table<'a>) -> Option<Flash> {
+        let mut pins = [const { None }; flash::PINS.len()];
+        if let Some(list) = table.need("pins", table.table("pins")) {
+            for ((name, _), pin) in flash::PINS.into_iter().zip(&mut pins) {
+                *pin = list.need(name, list.string(name)).and_then(|at| self.pin(at, name));
+            }
+            list.reject_unknown_keys(&[]);
+        }
+        let address = |key| {
+            let at = table.need(key, table.integer(key, 0, flash::REACH - 1))?;
+            if at.value % flash::SECTOR != 0 {
+                let text = format!(
+                    "an image begins at a multiple of {} bytes (0x{:x})",
+                    flash::SECTOR,
+                    flash::SECTOR
+                );
+                self.document.mistake(&at.place, text);
+            }
+            Some(at.value)
+        };
+        let (first, second) = (address("first"), address("second"));
+        table.reject_unknown_keys(&[]);
+        let [select, clock, out, input] = pins;
+        Some(Flash {
+            pins: [select?, clock?, out?, input?],
+            slots: [first?, second?],
+            place: table.place.clone(),
+        })
     }
 
     /// The table `[scope]`: channels and samples are powers of two.

@@ -10,6 +10,7 @@ mod emulated;
 mod families;
 mod family;
 mod files;
+mod flash;
 mod harness;
 mod observe;
 mod peripherals;

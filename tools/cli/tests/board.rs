@@ -730,3 +730,70 @@ fn path_from_pin_to_pin_has_a_bound() {
     refused("--wiring broken.toml", "broken.toml:1:10:");
     refused("--wiring none.toml --board ulx3s-85f", "none.toml: no path from pin to pin");
 }
+
+/// A program that is stored in the flash starts at the next power-up, until the flash forgets it; a board without a flash is told so.
+#[test]
+fn a_stored_program_starts_at_power_up() {
+    let folder = Folder::new();
+    let program = |mark: u32| {
+        format!(
+            ".schedule on\n.output mark:int\n.param gain = 1 range 0..9\n.output twice\n.once\n mark = {mark}\n twice = 2*gain\n wait period\n.period\nperiod: mark = {mark}\n twice = 2*gain\n wait period\n"
+        )
+    };
+    folder.write("first.s", program(1));
+    folder.write("second.s", program(2));
+    let plain = "clock = 50\nperiod = 40\nbaud = 10_000_000\nautostart = true\n";
+    folder.write("plain.toml", plain);
+    let flash = "[flash]\npins = { select = \"gp0\", clock = \"gp1\", out = \"gp2\", in = \"gp3\" }\nfirst = 0x100000\nsecond = 0x110000\n";
+    folder.write("wiring.toml", format!("{plain}{flash}"));
+    let start = |more: &str| {
+        let line = format!("board sim --board ulx3s-85f --program first.s --machine t1 {more}");
+        SimulatedBoard::start(&line, folder.path())
+    };
+    let live = |board: &SimulatedBoard, command: &str| {
+        folder.line(&format!("live {} --baud {} {command}", board.port, board.baud))
+    };
+    let load = |board: &SimulatedBoard, more: &str| {
+        folder.line(&format!("load {} --baud {} --machine t1 {more}", board.port, board.baud))
+    };
+    let values = |board: &SimulatedBoard| live(board, "--program second.s --machine t1 read mark twice").ok();
+    {
+        let board = start("--wiring wiring.toml --flash kept.bin");
+        assert!(
+            live(&board, "flash")
+                .ok()
+                .starts_with("started with the bitstream's program\nfirst image, at 0x100000: none")
+        );
+        let told = load(&board, "second.s --param gain=3 --flash").ok();
+        assert!(told.contains("image 1 stored in the flash and compared, as the first of two"), "{told}");
+    }
+    {
+        let board = start("--wiring wiring.toml --flash kept.bin");
+        assert!(live(&board, "flash").ok().starts_with("started with the first image\n"));
+        assert_eq!(values(&board), "mark = 2\ntwice = 6\n");
+        assert!(live(&board, "flash --forget").ok().starts_with("no image is valid now"));
+    }
+    {
+        let board = start("--wiring wiring.toml --flash kept.bin");
+        assert_eq!(values(&board), "mark = 1\ntwice = 2\n");
+    }
+    let board = start("--wiring plain.toml");
+    let refused = load(&board, "second.s --flash");
+    assert_eq!(refused.status, Some(1));
+    assert!(
+        refused
+            .stderr
+            .contains("this board has no flash: its wiring names the pins of one in the table `[flash]`"),
+        "{}",
+        refused.stderr
+    );
+    let refused = folder.line(
+        "board sim --board ulx3s-85f --program first.s --machine t1 --wiring plain.toml --flash kept.bin",
+    );
+    assert_eq!(refused.status, Some(1));
+    assert!(
+        refused.stderr.contains("--flash is for a wiring with the table `[flash]`"),
+        "{}",
+        refused.stderr
+    );
+}

@@ -144,6 +144,7 @@ fn unused(wiring: &Wiring) -> Vec<&'static str> {
         ("takt_trip.v", has(|strobes| strobes.trips)),
         ("takt_watchdog.v", wiring.signal("watchdog").is_some()),
         ("takt_clock_watch.v", wiring.clock_watch),
+        ("takt_flash.v", wiring.flash.is_some()),
     ];
     needed.into_iter().filter(|(_, is_needed)| !is_needed).map(|(name, _)| name).collect()
 }

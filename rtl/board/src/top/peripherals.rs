@@ -4,6 +4,7 @@
 use super::template::Values;
 use crate::application::Application;
 use crate::carrier::{Carrier, Instant};
+use crate::flash::PINS;
 use crate::kind::Direction;
 use crate::latency::window_start;
 use crate::sinks::{Sink, sinks};
@@ -31,6 +32,12 @@ pub(crate) fn own_pins(wiring: &Wiring) -> Vec<OwnPin> {
         let (name, direction) = (format!("signal_{}", signal.name), signal.direction);
         let off = (signal.name == "drive").then_some(false);
         pins.extend(pin.clone().map(|pin| OwnPin { name, direction, pin, is_register: false, off }));
+    }
+    if let Some(flash) = &wiring.flash {
+        for ((name, direction), pin) in PINS.into_iter().zip(&flash.pins) {
+            let (name, is_register) = (format!("flash_{name}"), direction == Direction::Output);
+            pins.push(OwnPin { name, direction, pin: pin.clone(), is_register, off: None });
+        }
     }
     for peripheral in &wiring.peripherals {
         for (pin, at) in peripheral.kind.pins.iter().zip(&peripheral.pins) {

@@ -9,6 +9,7 @@ use super::shadow_memory::Shadow;
 use super::template::{Values, fill};
 use super::{links, ports};
 use crate::application::Application;
+use crate::flash::{entries_room, half_bit};
 use crate::protocol::{self, CORE, core_bits};
 use crate::wiring::Wiring;
 use std::fmt::Write as _;
@@ -38,6 +39,7 @@ pub(super) fn wrapper(
     all.extend(connected.instances(wiring));
     all.extend(carriers(wiring));
     all.extend(pins(wiring));
+    all.extend(flash(wiring, contents, design.number));
     all.extend(cores(wiring, application));
     all.extend(memories(application, contents));
     all.extend(scope::section(scope, wiring, application));
@@ -69,6 +71,55 @@ fn host(wiring: &Wiring) -> Values {
     ]
 }
 
+/// The values for the flash: it has the bus before the host, from a reset until it has chosen what starts.
+fn flash(wiring: &Wiring, contents: &Contents, circuit: u32) -> Values {
+    let Some(flash) = &wiring.flash else {
+        let mut nothing: Values = vec![("QUIET", "rst".to_owned())];
+        nothing.extend(["ASKED", "FLASH_WRITABLE", "FLASH_VALUE", "FLASH"].map(|name| (name, String::new())));
+        return nothing;
+    };
+    let [first, second] = flash.slots;
+    let (block, room) = (protocol::FLASH >> 5, entries_room(contents.room));
+    let start = if wiring.autostart { protocol::RUN | protocol::ENABLE } else { 0 };
+    vec![
+        ("QUIET", "rst | flash_plays".to_owned()),
+        ("ASKED", "asked_".to_owned()),
+        (
+            "FLASH_WRITABLE",
+            format!(
+                "            16'd@A_FLASH@: writable <= ~flash_busy;\n            {}: writable <= ~flash_busy;\n",
+                (0..protocol::WORDS as u16)
+                    .map(|i| format!("16'd{}", protocol::FLASH + i))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            ),
+        ),
+        ("FLASH_VALUE", format!("address[15:5] == 11'd{block} ? flash_value : ")),
+        (
+            "FLASH",
+            format!(
+                "    wire        flash_plays, flash_write, flash_busy, asked_bus_write;
+    wire [15:0] flash_address, asked_address;
+    wire [31:0] flash_word, flash_value, asked_bus_value;
+    assign address   = flash_plays ? flash_address : asked_address;
+    assign bus_write = flash_plays ? flash_write : asked_bus_write;
+    assign bus_value = flash_plays ? flash_word : asked_bus_value;
+    takt_flash #(
+        .HALF({}), .CIRCUIT(32'h{circuit:08x}), .ROOM({room}), .FIRST(24'h{first:06x}), .SECOND(24'h{second:06x}),
+        .CONTROL(16'd@A_CONTROL@), .DEFAULT({start})
+    ) flash (
+        .clk(clk), .rst(rst), .pin_select(flash_select), .pin_clock(flash_clock), .pin_out(flash_out), .pin_in(flash_in),
+        .ready(~boot_reset), .plays(flash_plays), .play_write(flash_write), .play_address(flash_address), .play_value(flash_word),
+        .write(asked_bus_write & asked_address[15:5] == 11'd{block}), .address(asked_address[4:0]), .value(asked_bus_value),
+        .read(flash_value), .busy(flash_busy)
+    );
+",
+                half_bit(wiring.clock)
+            ),
+        ),
+    ]
+}
+
 /// The values for pins, parameters of the wiring, and addresses of the protocol.
 fn pins(wiring: &Wiring) -> Values {
     let pins: String = own_pins(wiring)
@@ -95,7 +146,8 @@ fn pins(wiring: &Wiring) -> Values {
     vec![
         ("NAME", AROUND.to_owned()),
         ("PINS", pins),
-        ("START", u8::from(wiring.autostart).to_string()),
+        // With a flash, `takt_flash` starts the program.
+        ("START", u8::from(wiring.autostart && wiring.flash.is_none()).to_string()),
         ("PERIOD", wiring.period.to_string()),
         ("LEAD", wiring.lead.to_string()),
         ("INPUTS_AT", (protocol::INPUTS >> 12).to_string()),

@@ -104,7 +104,8 @@ export class Comparison {
     const named = (entry) => entry.textContent.replace(/ (\d+|\([^)]*\))$/, "");
     const entries = new Map(this.pipelines.flatMap(({ legend }) => [...legend.children].map((entry) => [named(entry), entry])));
     this.legend.replaceChildren(...[...entries].map(([name, entry]) => node("span", {}, entry.querySelector("i").cloneNode(), name)));
-    // One scale for both: equal lengths are equal times.
+    // One scale for both, at which the longer is in sight: equal lengths are equal times.
+    for (const one of this.pipelines) one.fit();
     const width = Math.min(...this.pipelines.map((one) => one.width || Infinity));
     for (const one of this.pipelines) Object.assign(one, { width, fits: "" }).resize();
     const [a, b] = [before.picture.cycles, after.picture.cycles];

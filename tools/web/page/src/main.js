@@ -72,6 +72,7 @@ function select(name, focus) {
     if (on && focus) tab.focus();
   }
   state.tab = name;
+  showHint();
   // Until somebody steps, the debugger's position is nothing to look at.
   if (name === "step" || name === "code") document.body.classList.add("steps");
   if (name === "plot") plots.draw();
@@ -83,6 +84,12 @@ function select(name, focus) {
   if (name === "pipeline") pipelineInStep();
   if (name === "code") codeInStep();
   else editor?.paint(new Map());
+}
+
+/** Shows the hint of an example beside the curves, and in the tab that it names. */
+function showHint() {
+  const tab = state.tab ?? "plot", isNamed = el("try").textContent.includes(`the tab ${el(`tab-${tab}`).textContent}`);
+  el("try").hidden = tab !== "plot" && !isNamed;
 }
 
 /** Dims the diagram of an earlier program, but not a text in its place. */
@@ -305,6 +312,7 @@ async function open({ name, source, inputs, periods, plant, parameters, changes,
   const example = state.about.examples.find((one) => one.name === state.name && one.source === source);
   el("example").options[0].textContent = example ? `${example.name}: ${example.short}` : "open one …";
   el("try").textContent = example?.text ?? "";
+  showHint();
   el("example").title = example?.title ?? "Programs that come with Takt";
   const opened = editor.open(state.name, source, el("machine").value);
   changed("later");
@@ -1012,6 +1020,10 @@ async function start() {
   });
   el("from").addEventListener("change", act);
   el("machine-box").addEventListener("toggle", light);
+  // What lies over the page goes by a click beside it, or by Escape.
+  const over = [el("more"), el("export")];
+  document.addEventListener("pointerdown", ({ target }) => over.filter((box) => !box.contains(target)).forEach((box) => (box.open = false)));
+  document.addEventListener("keydown", ({ key }) => key === "Escape" && over.forEach((box) => (box.open = false)));
   for (const [id, ending, type] of [["plot-svg", "svg", "image/svg+xml"], ["plot-csv", "csv", "text/csv"]]) {
     el(id).addEventListener("click", () => state.run?.cycles.length && save(state.name.replace(/\.(s|tks)$/, `.${ending}`), plots[ending](), type));
   }

@@ -150,7 +150,7 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   const stepped = uPlot.paths.stepped({ align: 1 });
   const column = (values) => x.map((_, i) => (isNumber(values[i]) ? values[i] : null));
   const plot = new uPlot({
-    width: width(), height: height(), padding: [6, 18, 0, 0], scales: { x: { time: false }, y: { range } },
+    width: width(), height: height(), padding: [6, 18, 0, 0], scales: { x: { time: false, range: (_, from, to) => [from, unit && x.length > 1 ? to + x[1] - x[0] : to] }, y: { range } },
     axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }), ...(isTiny && { values: (_, splits) => splits.map(short) }) }],
     legend: { show: false }, cursor: { y: false, ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
     series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}${style("--pale")}`, width: 1.6, points: { show: false }, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...drawn.map(({ i, ...curve }) => ({

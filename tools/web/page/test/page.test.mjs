@@ -79,6 +79,8 @@ test("the integrator assembles and runs when the page opens, coloured by the lan
   assert.match(await page.textContent("#more-text"), /^measured in 400 periods · no schedule takes fewer than 38 cycles · period takes 38 to 43 whatever the inputs · before the first period 9$/);
   await page.click("#more summary");
   assert.ok((await page.locator("#more summary").boundingBox()).width < 80, "a button, not a bar");
+  await page.keyboard.press("Escape");
+  assert.equal(await page.locator("#more").evaluate((box) => box.open), false, "it goes by Escape");
   // All colours come from the server: if the page had a lexer of its own, this would fail.
   await page.waitForSelector(".tok-function");
   const instruction = await page.textContent(".tok-function");

@@ -13,10 +13,9 @@ use crate::terminal::number;
 use crate::terminal::output;
 #[cfg(unix)]
 use crate::terminal::progress::DelayedActivity;
-use anyhow::Result;
 #[cfg(unix)]
-use anyhow::anyhow;
-use anyhow::bail;
+use anyhow::{Context, anyhow};
+use anyhow::{Result, bail};
 use clap::{ArgGroup, Args};
 #[cfg(unix)]
 use std::io::{IsTerminal, Write};
@@ -28,7 +27,7 @@ use takt_board::emulated::EmulatedBoard;
 #[cfg(unix)]
 use takt_board::protocol::Line;
 #[cfg(unix)]
-use takt_board::simulation::{EncoderMotion, Simulation};
+use takt_board::simulation::{EncoderMotion, FLASH, Simulation};
 #[cfg(unix)]
 use takt_board::{Host, Wiring};
 
@@ -103,6 +102,9 @@ pub(super) struct Sim {
     /// With --serve: press the button at the pin `stop` once the outputs have driven for N periods.
     #[arg(long, value_name = "N", requires = "serve", value_parser = number::count, allow_hyphen_values = true)]
     stop_at: Option<u64>,
+    /// Contents of the flash at the pins of the wiring's `[flash]`; what a host stores there stays in this file [default: an erased one].
+    #[arg(long, value_name = "FILE", conflicts_with = "emulated")]
+    flash: Option<PathBuf>,
     /// Flip one in N bits on the UART, in either direction; 0 flips none.
     #[arg(long, default_value_t = 0, value_name = "N")]
     noise: u32,
@@ -224,6 +226,14 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
         None => None,
     };
     let folder = takt_cache::folder()?.join(format!("board-{}", std::process::id()));
+    if let Some(file) = &arguments.flash {
+        if wiring.flash.is_none() {
+            bail!("--flash is for a wiring with the table `[flash]`");
+        }
+        std::fs::create_dir_all(&folder)
+            .and_then(|()| std::os::unix::fs::symlink(std::path::absolute(file)?, folder.join(FLASH)))
+            .with_context(|| format!("cannot use {}", file.display()))?;
+    }
     let simulation = || -> Result<Simulation> {
         let _waiting = DelayedActivity::new(format!("compiling the circuit for {}", board.name));
         let mut sim = Simulation::new(&board, &wiring, carried.on_board(), &folder)?;

@@ -3,6 +3,7 @@
 
 mod comparison;
 mod fifo;
+mod flash;
 mod parameters;
 mod scope;
 mod serve;
@@ -61,7 +62,8 @@ pub(crate) fn open(port: &Path, baud: u32) -> Result<Host<Serial>> {
 
 /// Load a program, or the programs of a system, into a board over its serial port, and start it.
 ///
-/// The program that ran is stopped first, and outputs are safe. The loaded data is read back and compared. It stays until power-off.
+/// The program that ran is stopped first, and outputs are safe. The loaded data is read back and compared. It stays until power-off;
+/// with --flash it starts at each power-up, with its parameters.
 #[derive(Args)]
 pub(crate) struct LoadBoard {
     #[command(flatten)]
@@ -71,6 +73,10 @@ pub(crate) struct LoadBoard {
     /// Load only; `takt live PORT start` starts it.
     #[arg(long)]
     stopped: bool,
+    /// Store it in the board's flash, too, in place of the older of two images: until all of it is there and compared, a power-up begins
+    /// with the newer one. The wiring has the flash's pins.
+    #[arg(long)]
+    flash: bool,
     #[command(flatten)]
     machine: OptionalMachine,
     #[command(flatten)]
@@ -87,6 +93,7 @@ pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<
     let records = image(carried.on_board())?.records;
     let mut host = arguments.port.open()?;
     host.fits(carried.on_board())?;
+    let place = if arguments.flash { Some(flash::place(&mut host)?) } else { None };
     let bar = progress(records.len() as u64, "records", false);
     let loaded = host.load_with(&records, |more| bar.inc(more as u64));
     bar.finish_and_clear();
@@ -96,6 +103,9 @@ pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<
     }
     let state = if arguments.stopped { "stopped" } else { "started" };
     writeln!(out, "{} records loaded and compared; {state}", records.len())?;
+    if let Some(place) = place {
+        flash::store(&mut host, &place, &records, out)?;
+    }
     Ok(())
 }
 
@@ -179,6 +189,12 @@ enum Command {
     Pop {
         /// The FIFO.
         name: String,
+    },
+    /// Show the images in the board's flash, and with which of them the board started.
+    Flash {
+        /// Make both images invalid: the next power-up begins with the bitstream's program.
+        #[arg(long)]
+        forget: bool,
     },
     /// Record registers and ports on the board itself, in every period, around a trigger: no cycle of the program, no period left out.
     Scope(scope::ScopeArguments),
@@ -306,6 +322,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
                 writeln!(out, "{name} = {}", value_text(value, ty))?;
             }
         }
+        Command::Flash { forget } => flash::run(&mut host, *forget, out)?,
         Command::Set { .. } => {
             if let PreparedCommand::Settings(settings, names) = &prepared {
                 set(&mut host, settings, names)?;
