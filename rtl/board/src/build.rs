@@ -58,6 +58,17 @@ pub enum BuildError {
         /// Larger devices, or the word for none.
         larger: String,
     },
+    /// An image of the wiring's flash lies where the bitstream does.
+    #[error(
+        "the bitstream has {bytes} bytes (0x{bytes:x}) in the flash that the device is configured from, and the wiring has an image at \
+         0x{at:06x}: let both images begin behind the bitstream"
+    )]
+    Image {
+        /// Bytes of the bitstream.
+        bytes: u64,
+        /// Address of the image.
+        at: u32,
+    },
     /// The clock is not met.
     #[error(
         "timing is not met: {clock} reaches {reached:.1} MHz with seed {seed}, the best of {tried}, and needs {wanted:.1}. --seeds tries \
@@ -222,6 +233,11 @@ pub fn build<'a>(
     let bytes = fs::metadata(folder.join(pack.bitstream))
         .map_err(|error| BuildError::File(path(pack.bitstream), error))?
         .len();
+    if let Some(flash) = wiring.flash.as_ref().filter(|flash| flash.is_configuration())
+        && let Some(at) = flash.slots.into_iter().find(|at| u64::from(*at) < bytes)
+    {
+        return Err(BuildError::Image { bytes, at });
+    }
     let report = Report {
         seed,
         clocks,

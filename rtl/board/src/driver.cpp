@@ -226,7 +226,7 @@ int main(int argc, char **argv) {
                 left = DIVIDE;
             }
 #ifdef FLASH_SELECT
-            *inputs[FLASH_IN] = flash.cycle(*outputs[FLASH_SELECT], *outputs[FLASH_CLOCK], *outputs[FLASH_OUT]);
+            FLASH_IN = flash.cycle(FLASH_SELECT, FLASH_CLOCK, FLASH_OUT);
 #endif
             to_board(top, bits ? shift & 1 : 1);
             if (bits && --left == 0) {

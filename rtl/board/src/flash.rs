@@ -18,6 +18,9 @@ pub const PINS: [(&str, Direction); 4] = [
     ("in", Direction::Input),
 ];
 
+/// The pin `clock` of a flash that the device is configured from, where that clock is no ordinary pin.
+pub const MCLK: &str = "mclk";
+
 /// Bytes that the flash erases together.
 pub const SECTOR: u32 = 4096;
 /// Addresses of a flash that commands with three bytes of address reach.
@@ -48,6 +51,11 @@ pub struct Flash {
 }
 
 impl Flash {
+    /// The clock comes from the device's configuration, not from an ordinary pin.
+    pub fn is_configuration(&self) -> bool {
+        self.pins[1] == MCLK
+    }
+
     /// Why images with this room for records do not lie beside each other, in words.
     pub(crate) fn overlap(&self, records: usize) -> Option<String> {
         let ([first, second], bytes) = (self.slots, slot_bytes(records));

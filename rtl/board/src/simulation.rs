@@ -3,10 +3,11 @@
 
 use crate::application::Application;
 use crate::boards::Board;
+use crate::flash::{self, Flash};
 use crate::kind::Direction;
 use crate::protocol::{self, Line};
 use crate::safety_watch::{self, Watch};
-use crate::top::{self, OSCILLATOR, TOP, TopError, simulated_oscillator};
+use crate::top::{self, AROUND, OSCILLATOR, TOP, TopError, simulated_oscillator};
 use crate::wiring::Wiring;
 use std::fmt::Write as _;
 use std::fs;
@@ -462,23 +463,26 @@ fn build(
         }
         let _ = writeln!(header, "    (void)top; (void)pins;\n}}");
     }
-    let pin = |name: &str, names: &[&String]| names.iter().position(|own| *own == name);
-    if wiring.flash.is_some() {
-        let (inputs, outputs) =
-            (inputs.iter().map(|(name, _)| name).collect::<Vec<_>>(), outputs.iter().collect::<Vec<_>>());
-        let all = [
-            ("SELECT", "select", &outputs),
-            ("CLOCK", "clock", &outputs),
-            ("OUT", "out", &outputs),
-            ("IN", "in", &inputs),
-        ];
-        for (name, own, among) in all {
-            let at = pin(&format!("flash_{own}"), among).unwrap_or_default();
-            let _ = writeln!(header, "#define FLASH_{name} {at}");
-        }
+    // The levels at the flash's pins; the clock of a configuration flash is at none.
+    for (own, way) in flash::PINS.into_iter().filter(|_| wiring.flash.is_some()) {
+        let name = format!("flash_{own}");
+        let (at, list) = match way {
+            Direction::Input => (inputs.iter().position(|(input, _)| *input == name), "inputs"),
+            Direction::Output => (outputs.iter().position(|output| *output == name), "outputs"),
+        };
+        let level = match at {
+            Some(at) => format!("(*{list}[{at}])"),
+            None => format!("(top.rootp->{TOP}__DOT__around__DOT__{name})"),
+        };
+        let _ = writeln!(header, "#define FLASH_{} {level}", own.to_uppercase());
     }
     let watched = watch.map_or_else(|| "#define CORES 0\n#define SEEN 0\n".to_owned(), Watch::header);
-    let kept = watch.map_or_else(|| "`verilator_config\n".to_owned(), Watch::configuration);
+    let mut kept = watch.map_or_else(|| "`verilator_config\n".to_owned(), Watch::configuration);
+    let flash_clock =
+        board.family.flash_clock.filter(|_| wiring.flash.as_ref().is_some_and(Flash::is_configuration));
+    if flash_clock.is_some() {
+        let _ = writeln!(kept, "public_flat_rd -module \"{AROUND}\" -var \"flash_clock\"");
+    }
     let oscillator = simulated_oscillator(board, wiring);
     let verilog = verilog.into_iter().map(|file| match &oscillator {
         Some(text) if file.name == OSCILLATOR => (OSCILLATOR, text.as_str()),
@@ -488,7 +492,14 @@ fn build(
         name: TOP,
         top: TOP,
         prefix: "Vtop",
-        files: board.family.pll.iter().map(|pll| pll.stand_in).chain(verilog).collect(),
+        files: board
+            .family
+            .pll
+            .iter()
+            .map(|pll| pll.stand_in)
+            .chain(flash_clock.map(|clock| clock.stand_in))
+            .chain(verilog)
+            .collect(),
         driver: DRIVER,
         headers: vec![("pins.h", &header), ("watch.h", &watched), ("watch.vlt", &kept)],
         arguments: vec!["-Wno-fatal".to_owned(), "watch.vlt".to_owned()],

@@ -15,6 +15,7 @@ use crate::scope::{LEAST_DEPTH, MOST_CHANNELS, MOST_DEPTH, MOST_WORDS};
 use crate::top::image;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use takt_family::FAMILIES;
 use takt_isa::Type;
 use times::Times;
 
@@ -590,7 +591,9 @@ impl<'a> Reader<'a> {
         let mut pins = [const { None }; flash::PINS.len()];
         if let Some(list) = table.need("pins", table.table("pins")) {
             for ((name, _), pin) in flash::PINS.into_iter().zip(&mut pins) {
-                *pin = list.need(name, list.string(name)).and_then(|at| self.pin(at, name));
+                let at = list.need(name, list.string(name));
+                *pin =
+                    at.and_then(|at| if name == "clock" { self.flash_clock(at) } else { self.pin(at, name) });
             }
             list.reject_unknown_keys(&[]);
         }
@@ -614,6 +617,29 @@ impl<'a> Reader<'a> {
             slots: [first?, second?],
             place: table.place.clone(),
         })
+    }
+
+    /// The clock of a flash: a pin, or [`flash::MCLK`].
+    fn flash_clock(&mut self, at: Located<String>) -> Option<String> {
+        if at.value != flash::MCLK {
+            return self.pin(at, "clock");
+        }
+        let family = self.board.family;
+        if family.flash_clock.is_none() {
+            let known: Vec<&str> = FAMILIES
+                .iter()
+                .filter(|family| family.flash_clock.is_some())
+                .map(|family| family.text)
+                .collect();
+            let text = format!(
+                "`{}` is the clock of the flash that a {} is configured from; on {} it is a pin, or none",
+                at.value,
+                known.join(", "),
+                family.text
+            );
+            self.document.mistake(&at.place, text);
+        }
+        Some(at.value)
     }
 
     /// The table `[scope]`: channels and samples are powers of two.

@@ -79,6 +79,7 @@ const MADE_UP: Family = Family {
     carry: None,
     initial_registers: true,
     oscillator: None,
+    flash_clock: None,
     cells: Cells { luts: &[], carries: &[], flip_flops: &[], multipliers: &[], block_rams: &[] },
     pll: None,
     synthesis: None,

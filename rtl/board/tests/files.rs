@@ -165,7 +165,7 @@ const WRONG: &[(&str, &str, &str)] = &[
     (
         "gp2",
         "gp99",
-        "23:17: `gp99` is not a pin of ulx3s-85f; it has gp0, gn0, gp1, gn1, gp2, gn2 … (56 in all: `takt board pins ulx3s-85f`)",
+        "23:17: `gp99` is not a pin of ulx3s-85f; it has gp0, gn0, gp1, gn1, gp2, gn2 … (59 in all: `takt board pins ulx3s-85f`)",
     ),
     (
         "\"pwm\"",

@@ -43,8 +43,12 @@ fn circuit() -> u32 {
 
 /// The board with the bitstream's program 1, and a flash with these bytes; `life`: bytes that change before the power goes.
 fn power_up(folder: &Path, bytes: Option<&[u8]>, life: Option<u64>) -> Simulation {
+    power_up_with(WIRING, folder, bytes, life)
+}
+
+fn power_up_with(wiring: &str, folder: &Path, bytes: Option<&[u8]>, life: Option<u64>) -> Simulation {
     let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
-    let wiring = Wiring::read("w.toml", WIRING, &board).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+    let wiring = Wiring::read("w.toml", wiring, &board).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
     fs::create_dir_all(folder).expect("there is room");
     if let Some(bytes) = bytes {
         fs::write(folder.join("flash.bin"), bytes).expect("there is room");
@@ -181,6 +185,32 @@ fn a_host_updates_the_image() {
     flash::forget(&mut host, &place).unwrap_or_else(|error| panic!("{error}"));
     drop(host);
     assert_eq!(runs(&mut connect(power_up(&folder, None, None))), Some(1));
+}
+
+/// The flash that the device is configured from, whose clock is no ordinary pin.
+#[test]
+fn the_configuration_flash_serves_too() {
+    let own = WIRING
+        .replace("\"gp0\"", "\"flash_select\"")
+        .replace("\"gp1\"", "\"mclk\"")
+        .replace("\"gp2\"", "\"flash_out\"")
+        .replace("\"gp3\"", "\"flash_in\"");
+    let bytes = contents([None, Some(&flash::image(circuit(), 1, &entries(6)))]);
+    let mut host = connect(power_up_with(&own, &folder("own"), Some(&bytes), None));
+    assert_eq!(runs(&mut host), Some(6));
+    let place = host.flash().expect("it answers").expect("it has a flash");
+    assert_eq!(flash::numbers(&mut host, &place).unwrap_or_else(|error| panic!("{error}")), [None, Some(1)]);
+
+    let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
+    let wiring = Wiring::read("w.toml", &own, &board).unwrap_or_else(|mistakes| panic!("{mistakes:?}"));
+    let circuit = top::circuit(&board, &wiring, &program(1)).unwrap_or_else(|error| panic!("{error}"));
+    assert!(
+        circuit.pins.1.contains("\"flash_select\" SITE \"R2\"") && !circuit.pins.1.contains("flash_clock"),
+        "{}",
+        circuit.pins.1
+    );
+    let top = circuit.files.iter().find(|file| file.name == "takt_board.v").expect("it is there");
+    assert!(top.text.contains("USRMCLK flash_mclk (.USRMCLKI(flash_clock)"), "{}", top.text);
 }
 
 /// A flash by its data sheet, whose power goes after some changes of bytes.
@@ -325,6 +355,7 @@ fn mistakes_in_the_wiring_are_named() {
             "`second` must be a whole number from 0 to 16777215, not 0x1000000",
         ),
         ("clock = \"gp1\"", "clock = \"gp0\"", "pin `gp0` is used twice"),
+        ("clock = \"gp1\"", "clock = \"mcl\"", "`mcl` is not a pin of ulx3s-85f"),
         ("in = \"gp3\"", "input = \"gp3\"", "`in` is missing"),
         ("baud = 5_000_000", "uart = false", "`flash` is for a host, which `uart = false` leaves out"),
     ] {

@@ -111,7 +111,8 @@ module takt_flash #(
     reg         slot, replays;      // the image that is read, and whether its entries are written
     reg  [1:0]  valid, failed;
     reg  [31:0] first_number, second_number;
-    reg  [31:0] sum, word, left;    // left: words
+    reg  [31:0] sum, left;          // left: words
+    reg  [23:0] word;
     reg  [2:0]  index;              // of the word: 0 to 3, then 4 for an address and 5 for a value
     reg         wrong, at_end;
     reg  [1:0]  running;
@@ -120,7 +121,7 @@ module takt_flash #(
     wire [7:0]  reads  = step == 2'd0 ? 8'h03 : step == 2'd1 ? base[23:16] : step == 2'd2 ? base[15:8] : base[7:0];
     assign byte_out = state == WAKE ? 8'hab : state == COMMAND ? reads : state == HOST & sends != 7'd0 ? send_word[8*send_at[1:0] +: 8] : 8'd0;
     assign busy = plays | host_runs;
-    wire [31:0] whole = {word[23:0], byte_in};
+    wire [31:0] whole = {word, byte_in};
 
     always @(posedge clk) begin
         byte_starts <= 1'b0;
@@ -160,7 +161,7 @@ module takt_flash #(
             WORDS: begin
                 if (byte_ends) begin
                     step <= step + 2'd1;
-                    word <= whole;
+                    word <= whole[23:0];
                     if (step == 2'd3) begin
                         left   <= left - 32'd1;
                         at_end <= left == 32'd1;
@@ -247,7 +248,9 @@ module takt_flash #(
             state       <= WAKE;
             pin_select  <= 1'b1;
             byte_starts <= 1'b0;
-            {slot, replays, valid, failed, running, host_runs, play_write} <= 10'd0;
+            {slot, replays, running, host_runs, play_write} <= 6'd0;
+            valid       <= 2'd0;
+            failed      <= 2'd0;
             {step, wrong, at_end} <= 4'd0;
             plays <= 1'b1;
         end
@@ -261,5 +264,7 @@ module takt_flash #(
             default: read <= buffer[address[3:0]];
         endcase
     end
+
+    wire unused = &{1'b0, ahead[30:0]};
 
 endmodule

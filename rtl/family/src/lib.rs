@@ -64,6 +64,8 @@ pub struct Family {
     pub initial_registers: bool,
     /// Oscillator within the device; `None` without an oscillator that a design can use.
     pub oscillator: Option<Oscillator>,
+    /// Way to the clock of the flash that the device is configured from, where it is no ordinary pin; `None` without such a way.
+    pub flash_clock: Option<FlashClock>,
     /// Cells of yosys' netlist that count as resources.
     pub cells: Cells,
     /// PLL; `None` if Takt knows no dividers for it: the pin's clock is then the board's clock.
@@ -104,6 +106,15 @@ pub struct Carry {
     pub luts: u64,
     /// Ports by which nextpnr's report names the chain.
     pub ports: &'static [&'static str],
+}
+
+/// Cell that drives the clock of the configuration flash.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlashClock {
+    /// Instance in Verilog that takes the net `flash_clock`.
+    pub instance: &'static str,
+    /// The cell in simulation, where it drives nothing.
+    pub stand_in: File,
 }
 
 /// Oscillator within a device.

@@ -4,6 +4,7 @@
 use super::peripherals::{OwnPin, direction, own_pins};
 use super::wrapper::AROUND;
 use crate::boards::Board;
+use crate::flash::Flash;
 use crate::kind::Direction;
 use crate::wiring::Wiring;
 use std::fmt::Write as _;
@@ -44,6 +45,12 @@ pub(super) fn top(board: &Board, wiring: &Wiring) -> Result<String, PllError> {
                 let _ = write!(connections, ", .{name}({inner})");
             }
         }
+    }
+    if let Some(clock) = board.family.flash_clock
+        && wiring.flash.as_ref().is_some_and(Flash::is_configuration)
+    {
+        connections.push_str(", .flash_clock(flash_clock)");
+        let _ = writeln!(constants, "    wire flash_clock;\n    {}", clock.instance);
     }
     for i in 0..board.high.len() {
         let _ = write!(ports, ",\n    output wire high{i}");

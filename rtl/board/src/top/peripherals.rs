@@ -4,7 +4,7 @@
 use super::template::Values;
 use crate::application::Application;
 use crate::carrier::{Carrier, Instant};
-use crate::flash::PINS;
+use crate::flash::{MCLK, PINS};
 use crate::kind::Direction;
 use crate::latency::window_start;
 use crate::sinks::{Sink, sinks};
@@ -34,7 +34,7 @@ pub(crate) fn own_pins(wiring: &Wiring) -> Vec<OwnPin> {
         pins.extend(pin.clone().map(|pin| OwnPin { name, direction, pin, is_register: false, off }));
     }
     if let Some(flash) = &wiring.flash {
-        for ((name, direction), pin) in PINS.into_iter().zip(&flash.pins) {
+        for ((name, direction), pin) in PINS.into_iter().zip(&flash.pins).filter(|(_, pin)| *pin != MCLK) {
             let (name, is_register) = (format!("flash_{name}"), direction == Direction::Output);
             pins.push(OwnPin { name, direction, pin: pin.clone(), is_register, off: None });
         }

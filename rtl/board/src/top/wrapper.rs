@@ -17,6 +17,8 @@ use takt_isa::Machine;
 use takt_rtl::Library;
 use takt_system::{Link, MAX_CORES};
 
+/// Port for the clock of a configuration flash.
+const FLASH_CLOCK: &str = ",\n    output wire flash_clock";
 /// Name of the module around cores and peripherals.
 pub const AROUND: &str = "takt_peripherals";
 /// Minimum cycles of reset after the last record: longer than anything is under way in a core or on a link.
@@ -125,6 +127,7 @@ fn pins(wiring: &Wiring) -> Values {
     let pins: String = own_pins(wiring)
         .iter()
         .map(|pin| format!(",\n    {} {}", direction(pin.direction), pin.name))
+        .chain(wiring.flash.iter().filter(|flash| flash.is_configuration()).map(|_| FLASH_CLOCK.to_owned()))
         .collect();
     let mut signals = String::new();
     for (name, value) in

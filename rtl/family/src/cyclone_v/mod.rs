@@ -47,6 +47,7 @@ pub static FAMILY: Family = Family {
         runs: 100.0,
         instance: "cyclonev_oscillator oscillator (.oscena(1'b1), .clkout(oscillation));",
     }),
+    flash_clock: None,
     cells: Cells {
         luts: &[("MISTRAL_ALUT", 1), ("MISTRAL_NOT", 1), ("MISTRAL_MLAB", 2)],
         carries: &[],

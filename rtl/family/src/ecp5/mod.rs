@@ -6,8 +6,8 @@ mod netlist;
 mod pll;
 
 use crate::{
-    Carry, Cells, Constraints, Family, File, Mapping, MeasurementDevice, Models, Oscillator, Pack, Part,
-    Pinout, Place, Pll, Proof, Pull, Synthesis, YosysFile, pins, room,
+    Carry, Cells, Constraints, Family, File, FlashClock, Mapping, MeasurementDevice, Models, Oscillator,
+    Pack, Part, Pinout, Place, Pll, Proof, Pull, Synthesis, YosysFile, pins, room,
 };
 use std::fmt::Write as _;
 use takt_isa::memory::{KBIT_18, Memories, Shape};
@@ -39,6 +39,10 @@ pub static FAMILY: Family = Family {
         mhz: (2.4, 155.0),
         runs: 310.0 / 32.0,
         instance: "OSCG #(.DIV(32)) oscillator (.OSC(oscillation));",
+    }),
+    flash_clock: Some(FlashClock {
+        instance: "USRMCLK flash_mclk (.USRMCLKI(flash_clock), .USRMCLKTS(1'b0));",
+        stand_in: ("USRMCLK.v", "module USRMCLK (input USRMCLKI, input USRMCLKTS); endmodule\n"),
     }),
     cells: Cells {
         // The 16 x 4 bits of a memory in logic take four LUT4.

@@ -37,6 +37,7 @@ pub static FAMILY: Family = Family {
     carry: None,
     initial_registers: true,
     oscillator: None,
+    flash_clock: None,
     cells: Cells {
         luts: &[("CC_L2T4", 1), ("CC_L2T5", 2), ("CC_LUT", 1), ("CC_ADDF", 1), ("CC_MX", 2)],
         carries: &[],

@@ -40,6 +40,7 @@ const GW2A: Family = Family {
         runs: 250.0 / 26.0,
         instance: "OSC #(.FREQ_DIV(26), .DEVICE(\"GW2A-18\")) oscillator (.OSCOUT(oscillation));",
     }),
+    flash_clock: None,
     cells: CELLS,
     pll: Some(Pll { instance: pll::gw2a, stand_in: ("rPLL.v", include_str!("rPLL.v")) }),
     synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw2a", top, netlist), files: FILES }),

@@ -44,6 +44,7 @@ pub static FAMILY: Family = Family {
         runs: 12.0,
         instance: "SB_HFOSC #(.CLKHF_DIV(\"0b10\")) oscillator (.CLKHFPU(1'b1), .CLKHFEN(1'b1), .CLKHF(oscillation));",
     }),
+    flash_clock: None,
     cells: Cells {
         luts: &[("SB_LUT4", 1)],
         carries: &[],

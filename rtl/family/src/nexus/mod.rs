@@ -27,6 +27,7 @@ pub static FAMILY: Family = Family {
         runs: 10.0,
         instance: "OSCA #(.HF_CLK_DIV(\"44\"), .HF_OSC_EN(\"ENABLED\")) oscillator (.HFOUTEN(1'b1), .HFSDSCEN(1'b0), .HFCLKOUT(oscillation));",
     }),
+    flash_clock: None,
     cells: Cells {
         luts: &[("LUT4", 1), ("DPR16X4", 4)],
         carries: &[],

@@ -34,6 +34,7 @@ pub static FAMILY: Family = Family {
         .CFGMCLK(oscillation), .CLK(1'b0), .GSR(1'b0), .GTS(1'b0), .KEYCLEARB(1'b1), .PACK(1'b0), .USRCCLKO(1'b0), .USRCCLKTS(1'b1),
         .USRDONEO(1'b1), .USRDONETS(1'b1)
     );" }),
+    flash_clock: None,
     cells: Cells {
         luts: &[
             ("LUT", 1),
