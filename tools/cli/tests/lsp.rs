@@ -477,7 +477,7 @@ fn cycles_stand_beside_the_lines() {
         .find(|section| section["name"] == "period")
         .unwrap()["cycles"];
     let title = lenses[0]["command"]["title"].as_str().unwrap();
-    assert!(title.starts_with(&format!("period: {} cycles, bound ", cycles["worst"])), "{title}");
+    assert!(title.starts_with(&format!("period: {} cycles, lower bound ", cycles["worst"])), "{title}");
     assert_eq!(lenses[0]["range"]["start"]["line"], 5);
     for (lens, command) in lenses.as_array().unwrap().iter().rev().zip(["debug", "run"]) {
         assert_eq!(lens["range"], lenses[0]["range"]);
@@ -589,7 +589,10 @@ fn the_picture_is_old_while_an_included_file_is_wrong() {
     assert_eq!(picture["current"], true);
     let sections: Vec<_> =
         picture["sections"].as_array().unwrap().iter().map(|text| text.as_str().unwrap()).collect();
-    assert!(sections[0].starts_with("period: ") && sections[0].contains(" cycles, bound "), "{sections:?}");
+    assert!(
+        sections[0].starts_with("period: ") && sections[0].contains(" cycles, lower bound "),
+        "{sections:?}"
+    );
     let wrong = session.edit("part.s", PART, "fmul    tmp", "fmull   tmp");
     let old = session.ask("takt/pipeline", params.clone());
     assert_eq!((&old["current"], &old["sections"]), (&json!(false), &picture["sections"]));
@@ -899,7 +902,7 @@ fn neovim_uses_the_language_server() {
     assert!(found["symbols"].as_u64().unwrap() > 50 && found["folds"].as_u64().unwrap() > 10);
     let lenses = found["lenses"].as_array().unwrap();
     let period = lenses.iter().filter_map(Value::as_str).find(|title| title.starts_with("period: ")).unwrap();
-    assert!(period.contains("cycles, bound ") && period.contains(", deadline kept by 12,"), "{period}");
+    assert!(period.contains("cycles, lower bound ") && period.contains(", deadline kept by 12,"), "{period}");
     assert!(found["hints"].as_u64().unwrap() > 80);
     assert!(text("hint").ends_with(&format!(" · {slot}")), "{found}");
     assert!(text("refused").contains("is declared already"), "{found}");

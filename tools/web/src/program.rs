@@ -318,7 +318,7 @@ fn facts(loaded: &LoadedProgram) -> Value {
             *address == section.address && section.cycles.best == section.cycles.worst && !section.once
         };
         let least = path.filter(is_one_path).map(|(_, least)| least);
-        json!({ "name": section.name, "once": section.once, "cycles": span(cycles), "least": least })
+        json!({ "name": section.name, "once": section.once, "cycles": span(cycles), "missed": section.missed.worst, "least": least })
     };
     let (bounds, no_bound) = match takt_analysis::bound(program) {
         Ok(bounds) => (Some(bounds.sections.iter().map(section).collect::<Vec<_>>()), None),

@@ -305,7 +305,8 @@ impl Search<'_> {
         }
         let tried: Vec<Option<Candidate>> =
             machines.par_iter().map(|machine| self.candidate(machine)).collect();
-        self.tried += tried.len() as u64;
+        // After Ctrl-C, rows are left out; those on which a program does not run are among them.
+        self.tried += if is_stopped() { tried.iter().flatten().count() } else { tried.len() } as u64;
         let good: Vec<Candidate> = tried.into_iter().flatten().collect();
         for Candidate { cycles, estimate, .. } in &good {
             let longest = cycles.iter().copied().max().unwrap_or(0);

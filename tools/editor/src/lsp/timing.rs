@@ -170,7 +170,7 @@ fn section_text(
     };
     let block = blocks.iter().position(whole);
     if let Some(number) = block {
-        let _ = write!(text, ", bound {}", blocks[number].bound.cycles());
+        let _ = write!(text, ", lower bound {}", blocks[number].bound.cycles());
     }
     // The same computation as in `takt bound --deadline`.
     let worst = section.in_time.worst + 1;
@@ -220,7 +220,7 @@ pub(crate) fn lenses(
     for (_, block) in blocks.iter().enumerate().filter(|(number, _)| !told.contains(number)) {
         if let Some(line) = line(block.location) {
             let text = format!(
-                "block: {}, bound {}",
+                "block: {}, lower bound {}",
                 plural(u64::from(block.cycles), "cycle"),
                 block.bound.cycles()
             );

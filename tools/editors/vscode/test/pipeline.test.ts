@@ -12,7 +12,7 @@ const bundle = (from: string, cycle: number, operations: Bundle['operations'], s
 const picture: Pipeline = {
   machine: 't3',
   current: true,
-  sections: ['period: 38 cycles, bound 38', 'once: 9 cycles from reset'],
+  sections: ['period: 38 cycles, lower bound 38', 'once: 9 cycles from reset'],
   files: ['file:///p/a%20b.s', null],
   bundles: [
     bundle('once', 1, [operation(0, 4), operation(1, 2)]),
@@ -63,10 +63,10 @@ test('only messages of the protocol are heard', () => {
 
 test('the status bar has the period, and says when it is that of an older text', () => {
   const { text, more } = inStatus(picture);
-  assert.equal(text, '$(graph) period: 38 cycles, bound 38');
-  assert.equal(more, 'On t3\nperiod: 38 cycles, bound 38\nonce: 9 cycles from reset\nClick to see the pipeline');
+  assert.equal(text, '$(graph) period: 38 cycles, lower bound 38');
+  assert.equal(more, 'On t3\nperiod: 38 cycles, lower bound 38\nonce: 9 cycles from reset\nClick to see the pipeline');
   const old = inStatus({ ...picture, current: false });
-  assert.equal(old.text, '$(history) period: 38 cycles, bound 38 before');
+  assert.equal(old.text, '$(history) period: 38 cycles, lower bound 38 before');
   assert.match(old.more, /Of the text before/);
   for (const none of [null, { ...picture, sections: [] }]) assert.match(inStatus(none).more, /not counted/);
 });

@@ -140,7 +140,7 @@ test('a server that does not start is told with the reason', limit, async () => 
 test('cycles, a mistake and its fix, the pipeline beside the source, the debugger', limit, async (t) => {
   const page = await open('good', TAKT);
   await part(t, page, 'cycles stand above sections and behind lines', async () => {
-    await page.locator('.codelens-decoration', { hasText: 'period: 38 cycles, bound 38' }).waitFor();
+    await page.locator('.codelens-decoration', { hasText: 'period: 38 cycles, lower bound 38' }).waitFor();
     await page.locator('.view-line', { hasText: 'fsub' }).filter({ hasText: '1 · add' }).first().waitFor();
   });
   await part(t, page, 'a mistake is marked as it is typed, and mended by its fix', async () => {
@@ -177,7 +177,7 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
     await page.locator('.statusbar-item', { hasText: `Ln ${wait},` }).waitFor();
   });
   await part(t, page, 'the status bar has the cycles, and the view comes back with the window', async () => {
-    await page.locator('.statusbar-item', { hasText: 'period: 38 cycles, bound 38' }).waitFor();
+    await page.locator('.statusbar-item', { hasText: 'period: 38 cycles, lower bound 38' }).waitFor();
     // Reload the window as users do; VS Code restores what was open.
     await Promise.all([page.waitForEvent('load'), command(page, 'Developer: Reload Window')]);
     const picture = page.frameLocator('iframe.webview').frameLocator('#active-frame');
@@ -205,7 +205,7 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
     await openFile(page, 'whole.s');
     await note('of the text before').waitFor();
     assert.ok(await picture.locator('body.stale').count(), 'it is dimmed');
-    await page.locator('.statusbar-item', { hasText: /period: 4\d cycles, bound 4\d before/ }).waitFor();
+    await page.locator('.statusbar-item', { hasText: /period: 4\d cycles, lower bound 4\d before/ }).waitFor();
     await shot(page, 'stale');
     await openFile(page, part);
     await page.keyboard.press('Control+z');

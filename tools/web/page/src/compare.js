@@ -84,10 +84,15 @@ export class Comparison {
     this.legend = node("div", { className: "tp-legend compare-legend" });
     this.all = node("input", { type: "checkbox" });
     this.all.addEventListener("change", () => this.rows());
-    this.total = node("p", { className: "compare-total", textContent: "Assembling the other side …" });
+    this.total = node("p", { className: "compare-total" });
     this.table = node("table", { className: "compare-lines" });
     const head = node("p", {}, "Cycles by line ", node("label", {}, this.all, " equal lines, too"));
     parent.replaceChildren(this.total, node("div", { className: "tp" }, this.legend), node("div", { className: "compare-sides" }, ...this.sides.map(({ element }) => element)), head, node("div", { className: "compare-scroll" }, this.table));
+  }
+
+  /** Says that the other side is still to come, with the seconds since then. */
+  waits(text) {
+    this.total.replaceChildren(text, node("span", { className: "seconds" }), " …");
   }
 
   /** Shows two sides: `title`, `name` and `source` of the text, `picture`. */

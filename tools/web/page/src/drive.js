@@ -96,6 +96,7 @@ export class Drive {
 
   shows(pose, index) {
     el("time").value = index;
+    el("time-at").textContent = `${(pose[0] * this.robot.sampleTime).toFixed(1)} s`;
     this.error?.cursor(index);
   }
 

@@ -292,7 +292,7 @@ export class Editor {
     // What the server still does is about the text before, and the next text would wait for it.
     if (this.thread.busy) this.thread.stop(REPLACED);
     if (!this.client) return;
-    this.view.dispatch({ effects: [this.server.reconfigure([]), setColours.of(Decoration.none), setHints.of(Decoration.none)] });
+    this.view.dispatch({ effects: [this.server.reconfigure([]), setHints.of(Decoration.none)] });
     this.client.disconnect();
     this.client = null;
   }

@@ -340,14 +340,25 @@ function elapsed(now, { usual, idle }) {
   return !usual ? `, ${now} s` : now <= usual ? `, ${now} of about ${usual} s` : `, ${now} s, longer than the usual ${usual} s`;
 }
 
-/** Counts the seconds of assembling, wherever the page says that it assembles; returns what ends the count. */
-function countSeconds() {
-  const begun = performance.now(), usual = seconds();
+/** Counts the seconds of assembling in the elements of `where`, by default wherever the page says that it assembles; returns what ends the count. */
+function countSeconds(where = ".elapsed", usual = seconds()) {
+  const begun = performance.now();
   const timer = setInterval(() => {
     const now = Math.floor((performance.now() - begun) / 1000);
-    for (const one of document.querySelectorAll(".elapsed")) one.textContent = elapsed(now, usual);
+    for (const one of document.querySelectorAll(where)) one.textContent = elapsed(now, usual);
   }, 1000);
   return () => clearInterval(timer);
+}
+
+/** Says in the summary, in place of the figures before, that a change takes longer to assemble; returns what ends that. */
+function sayAssembling() {
+  const timer = setTimeout(() => {
+    if (!state.shown || state.tuning || state.ahead) return;
+    el("cycles").className = "now";
+    el("cycles").replaceChildren(...assembling(`${state.name} on ${el("machine").selectedOptions[0]?.text}: assembling`));
+    el("more").hidden = true;
+  }, SOON);
+  return () => clearTimeout(timer);
 }
 
 /** A text that ends with the seconds of assembling; they are not read aloud each second. */
@@ -393,7 +404,8 @@ const timed = () => `${state.name} ${el("machine").value.slice(0, 20)}`;
 function seconds() {
   const took = times()[timed()];
   if (took !== undefined) return { usual: Math.round(took) };
-  return { idle: state.about.examples.find(({ name, source }) => name === state.name && source === editor.text)?.seconds };
+  const isIt = (one) => one.name === state.name && one.source === editor.text && shipped(one, PERIODS).machine === el("machine").value;
+  return { idle: state.about.examples.find(isIt)?.seconds };
 }
 
 /** Keeps the time of a result that took long. */
@@ -468,7 +480,7 @@ function showCycles(program = state.program) {
   const least = Math.max(...periods.map((section) => section.least ?? 0)), more = [];
   if (run?.cycles.length) more.push(`measured in ${plural(run.cycles.length, "period")}`);
   if (least > 0) more.push(`no schedule takes fewer than ${least} cycles`);
-  for (const section of periods) more.push(`${section.name} takes ${range(section.cycles)} whatever the inputs`);
+  for (const section of periods) more.push(`${section.name} takes ${range(section.cycles)} whatever the inputs, ${section.missed.toLocaleString("en")} after a missed deadline`);
   if (once) more.push(`before the first period ${range(once.cycles)}`);
   el("more").hidden = !more.length;
   el("more-text").textContent = more.join(" · ");
@@ -557,7 +569,7 @@ function showParameters() {
     const chip = Object.assign(document.createElement("span"), { className: "chip", textContent: `${change.name} = ${change.value} from ${change.period} ` });
     chip.append(close);
     return chip;
-  }), ...(changes.length ? [] : [matchMedia("(pointer: coarse)").matches ? "from there on" : "a click on a curve sets it"]));
+  }), ...(changes.length ? [] : [matchMedia("(pointer: coarse)").matches ? "a tap on a curve sets it" : "a click on a curve sets it"]));
   plots.mark = all.length ? { from: from(), changes, picked: (period) => ((el("from").value = period), act()) } : null;
 }
 
@@ -631,10 +643,10 @@ function drawAhead() {
 /** Assembles the program, and restores the breakpoints. */
 async function begin() {
   const { version } = editor, { opens } = state;
-  const wanted = asked(), answer = machine.call("assemble", wanted), counted = countSeconds();
+  const wanted = asked(), answer = machine.call("assemble", wanted), counted = countSeconds(), said = sayAssembling();
   let over = false;
   showAhead(wanted, () => over);
-  const program = known(await answer.finally(() => (counted(), (over = true))), wanted);
+  const program = known(await answer.finally(() => (counted(), said(), (over = true))), wanted);
   if (opens !== state.opens) throw new Stopped(REPLACED);
   if (state.ahead && program.assembled) {
     // What the build has drawn is of this program.
@@ -660,6 +672,7 @@ async function work(doing) {
     if (opens !== state.opens || (error instanceof Stopped && error.message === REPLACED)) return;
     if (error instanceof Stopped) {
       state.stale = true;
+      if (state.shown) showCycles(state.shown);
       notice(`${error.message === "stopped" ? "Stopped." : `The machine stopped (${error.message}).`} The text is as it was; assemble again to go on.`);
     } else notice(error.message);
   } finally {
@@ -837,7 +850,8 @@ async function compare() {
   const wanted = side === "opened" ? state.opened : side === "kept" ? state.kept : { ...asked(), machine: side.slice(3) }, key = JSON.stringify([wanted, period]);
   if (comparison.key !== key) {
     if (other.busy) other.stop(REPLACED);
-    const assembled = await other.call("assemble", wanted);
+    comparison.waits(`Assembling ${wanted.name} ${side === "opened" ? "as it was opened" : side === "kept" ? "as it was kept" : side}`);
+    const counted = countSeconds("#comparison .seconds", {}), assembled = await other.call("assemble", wanted).finally(counted);
     if (!assembled.assembled) throw new Error(`What it is to be compared with does not assemble on this machine: ${assembled.messages[0]?.message ?? "see its text"}`);
     const { picture } = await other.call("picture", { period });
     const title = { opened: `as opened, on ${assembled.machine}`, kept: `kept, on ${assembled.machine}` }[side] ?? `on ${assembled.machine}`;
@@ -1036,7 +1050,7 @@ async function start() {
     if (!(await current())) return;
     const names = state.program.inputs.map((port) => port.name);
     if (!names.length) throw new Error("the program has no input port");
-    const { run } = state, row = (_, i) => names.map((name) => run?.inputs[name]?.[i] ?? 0).join(",");
+    const { run } = state, row = (_, i) => names.map((name) => (typeof run?.inputs[name]?.[i] === "number" ? binary32(run.inputs[name][i]) : run?.inputs[name]?.[i] ?? 0)).join(",");
     el("table").value = [names.join(","), ...Array.from({ length: run?.cycles.length || periods() }, row)].join("\n") + "\n";
     changed();
   }));

@@ -109,7 +109,7 @@ function heading(curves, look) {
  */
 export function chart(parent, { x, name: across, label, unit, curves, lines = [], height = () => 190, sync, picked, moments = [], place, folds }) {
   const axis = { stroke: style("--dim"), grid: { stroke: style("--edge"), width: 0.5 }, ticks: { stroke: style("--edge"), width: 0.5 }, labelSize: 17, labelGap: 0, labelFont: "12px system-ui, sans-serif", font: "11px system-ui, sans-serif" };
-  const of = curves[0].unit, whole = curves.every((curve) => curve.stepped);
+  const of = curves[0].unit, whole = curves.every((curve) => curve.stepped || curve.whole);
   const levels = [...lines, ...limitsOf(curves)];
   const lost = runs(x.length, (i) => curves.some(({ values }) => values[i] !== null && !isNumber(values[i])));
   const saturated = runs(x.length, (i) => curves.some(({ values, limit }) => isNumber(limit) && isNumber(values[i]) && Math.abs(values[i]) >= limit));
@@ -153,8 +153,8 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
     width: width(), height: height(), padding: [6, 18, 0, 0], scales: { x: { time: false, range: (_, from, to) => [from, unit && x.length > 1 ? to + x[1] - x[0] : to] }, y: { range } },
     axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }), ...(isTiny && { values: (_, splits) => splits.map(short) }) }],
     legend: { show: false }, cursor: { y: false, ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
-    series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}${style("--pale")}`, width: 1.6, points: { show: false }, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...drawn.map(({ i, ...curve }) => ({
-      label: curve.name, stroke: look[i].colour, width: 1.6, dash: look[i].dash, points: { show: true, filter: () => x.length < 40 || curve.points ? null : alone(curve.values), size: curve.points ? 6 : 4, ...(curve.points && { fill: look[i].colour }) },
+    series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}${style("--pale")}`, width: 1.6, points: { show: false }, pxAlign: 0, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...drawn.map(({ i, ...curve }) => ({
+      label: curve.name, stroke: look[i].colour, width: curve.given ? 1.1 : 1.6, dash: look[i].dash, pxAlign: 0, points: { show: true, filter: () => x.length < 40 || curve.points ? null : alone(curve.values), size: curve.points ? 6 : 4, ...(curve.points && { fill: look[i].colour }) },
       ...(curve.points && { paths: () => null, single: true }), ...(curve.stepped && { paths: stepped, stepped: true }),
     }))],
     hooks: { setCursor: [({ cursor: { idx } }) => (at.textContent = idx === null || idx === undefined ? "" : said(idx))], draw: [(plot) => mark(plot.ctx, plot, { x, levels, lost, saturated, moments })] },
@@ -362,10 +362,10 @@ export class Plots {
   /** The chosen curves, those of each chart together. */
   groups() {
     const { run, before, tools } = this, groups = new Map();
-    for (const [key, { name, unit, limit, together }] of this.facts) {
+    for (const [key, { name, unit, limit, together, type }] of this.facts) {
       if (!this.chosen.get(key)) continue;
       const kind = key.startsWith("out ") ? "outputs" : "inputs", old = before?.[kind][name];
-      const curve = { name, unit, limit, points: this.program.points, values: run[kind][name] ?? [], ...(old && { before: old }) };
+      const curve = { name, unit, limit, whole: type === "int", given: kind === "inputs", points: this.program.points, values: run[kind][name] ?? [], ...(old && { before: old }) };
       // Ports with a unit share the axis with others of that unit; those without, with what is declared beside them.
       let group = tools.together.value === "each" ? key : unit ?? `${kind}: ${together}`;
       while (groups.get(group)?.length >= TOGETHER) group += " more";

@@ -76,7 +76,7 @@ test("the integrator assembles and runs when the page opens, coloured by the lan
   const { page, errors } = await open();
   await done(page);
   assert.match(await cycles(page), /pi\.s on t3: 38 cycles a period, 0\.304 µs at 125 MHz · proved: at most 43, whatever the inputs$/);
-  assert.match(await page.textContent("#more-text"), /^measured in 400 periods · no schedule takes fewer than 38 cycles · period takes 38 to 43 whatever the inputs · before the first period 9$/);
+  assert.match(await page.textContent("#more-text"), /^measured in 400 periods · no schedule takes fewer than 38 cycles · period takes 38 to 43 whatever the inputs, 44 after a missed deadline · before the first period 9$/);
   await page.click("#more summary");
   assert.ok((await page.locator("#more summary").boundingBox()).width < 80, "a button, not a bar");
   await page.keyboard.press("Escape");
@@ -469,7 +469,7 @@ test("a mistake leaves the curves where they are, and no figure of the text befo
   await page.evaluate(() => takt.goTo(2, 13));
   for (let i = 0; i < 14; i++) await page.keyboard.press("Backspace");
   await page.waitForFunction(() => /38 cycles a period/.test(document.getElementById("cycles").textContent));
-  assert.match(await page.evaluate(() => getComputedStyle(document.getElementById("cycles"), "::after").content), /of the text before/);
+  assert.match(await page.evaluate(() => getComputedStyle(document.getElementById("cycles"), "::after").content), /before the change/);
   await page.keyboard.press("Control+Enter");
   await page.waitForFunction(() => !document.body.classList.contains("stale"));
   await done(page);
