@@ -515,9 +515,11 @@ impl Explorer<'_> {
                     continue;
                 }
                 let latest = if steady { most - turn } else { 0 };
+                // Iterations whose price is above their cycles make the shortest way the costliest.
+                let costliest = if worst < 0 { soonest } else { latest };
                 let more = Cost {
                     best: best.saturating_mul(soonest.into()),
-                    worst: worst.saturating_mul(latest.into()),
+                    worst: worst.saturating_mul(costliest.into()),
                 };
                 summary.add(outcome, cost.and(more));
             }

@@ -129,7 +129,13 @@ impl<'p> Graph<'p> {
                 // The sequencer's count is known only if control enters through `loop` and leaves after the body's end.
                 let enters = |from: &BundleAddress| !body.contains(from) && from.next() != head;
                 let entered = body.iter().any(|at| before.get(at).into_iter().flatten().any(enters));
-                if entered || exits.len() > 1 {
+                // A jump back to the head is an iteration that the sequencer does not count, and one out of the body, even to the bundle
+                // after it, leaves the loop on the stack.
+                let is_last = |from: &BundleAddress| matches!(graph.nodes.get(from.index()), Some(Ok(node)) if node.closes == Some(head));
+                let leaves = |edge: Edge| edge.to == head || !body.contains(&edge.to);
+                let left =
+                    body.iter().filter(|from| !is_last(from)).any(|from| graph.successors(*from).any(leaves));
+                if entered || left || exits.len() > 1 {
                     return Err(BoundError::new(program, head, Refusal::Unstructured));
                 }
             }

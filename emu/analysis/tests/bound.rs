@@ -586,6 +586,54 @@ fn a_jump_into_a_counted_loop_is_refused() {
     }
 }
 
+/// The sequencer does not count a jump back to the head, and a jump past the body leaves the loop on its stack.
+#[test]
+fn a_jump_to_either_end_of_a_counted_loop_is_refused() {
+    for target in ["head", "end"] {
+        let text = format!(
+            ".input n:int\n.reg k:int\n.preset k = 3\n.once\n loop k, end\nhead: nop\n nop\n bnz n, {target}\n nop\nend: halt\n"
+        );
+        for machine in MACHINES {
+            let error = bound(&source(&text, machine)).unwrap_err();
+            assert_eq!(error.refusal, Refusal::Unstructured, "{error}");
+        }
+    }
+}
+
+/// Iterations of one entry are shorter than those of the other, in either order: the price of an iteration is above the cycles of some.
+#[test]
+fn totals_hold_for_entries_with_iterations_of_different_lengths() {
+    for long in ["first", "second"] {
+        let [a, b] = if long == "first" { [1, 0] } else { [0, 1] };
+        let text = format!(
+            ".input n:int, k:int\n.output y:int\n.reg r:int q:int m:int c:int\n.once\n wait p\n.period\np: li r, {a}\n \
+             iadd c, r, 1\n loop c, e\n.loop_bound 3\n nop\ne: mov q, n\n call f\n li r, {b}\n mov q, k\n call f\n \
+             mov y, m\n wait p\nf: mov m, q\n.loop_bound 8 total 10\nnext: isub m, m, 1\n bz r, short\n nop\n nop\n \
+             nop\n nop\n nop\n nop\n nop\n nop\nshort: bnz m, next\n ret\n"
+        );
+        for machine in MACHINES {
+            let program = source(&text, machine);
+            let bounds = bound(&program).unwrap();
+            let mut worst = 0;
+            for (first, second) in (1..9).flat_map(|n| (1..9).map(move |k| (n, k))) {
+                if first + second > 10 {
+                    continue;
+                }
+                let mut emulator = Emulator::new(&program).unwrap();
+                let set = |emulator: &mut Emulator| {
+                    emulator.set_input("n", first.into()).unwrap();
+                    emulator.set_input("k", second.into()).unwrap();
+                };
+                let measured = measure(&mut emulator, 2, set);
+                check(&bounds, measured[2], machine.refill);
+                worst = worst.max(measured[2].cycles);
+            }
+            let section = bounds.sections.iter().find(|one| !one.once).unwrap().cycles;
+            assert!(section.worst >= worst && section.worst < 2 * worst, "{section:?} {worst}");
+        }
+    }
+}
+
 /// Paths that meet repeatedly are followed once from each meeting point, whatever the layout of the program.
 #[test]
 fn diamonds_laid_out_backwards_take_a_few_steps_each() {
