@@ -4,7 +4,7 @@
 //! Three tables ([`spec`]) describe the machine as data; the rest of the crate is driven by them and names no instruction:
 //! instruction formats ([`shape`]), encoder and decoder ([`encode`]), the manual ([`manual`]), the timing rules with their
 //! scoreboard ([`timing`]). [`fp`] has the bit-exact arithmetic kernels with which the rows of instructions define their
-//! results. Registers, slots and bundles have types of their own ([`number`]), and a bundle's control flow is a [`Flow`].
+//! results. [`certificate`] is the data of proved bounds. Registers, slots and bundles have types of their own ([`number`]), and a bundle's control flow is a [`Flow`].
 //!
 //! ```
 //! use takt_isa::{Instruction, Op, T3};
@@ -18,6 +18,7 @@
 //! assert_eq!(Instruction::decode(word), Ok(instruction));
 //! ```
 
+pub mod certificate;
 pub mod encode;
 pub mod flow;
 pub mod fp;

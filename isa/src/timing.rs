@@ -299,6 +299,16 @@ impl Residue {
         }
     }
 
+    /// Registers with a pending result, ascending, and the cycles until it is on the bus.
+    pub fn pending(&self) -> &[(Register, u16)] {
+        &self.pending
+    }
+
+    /// Busy units (slot, unit), ascending, and the cycles until each accepts an operation.
+    pub fn busy(&self) -> &[(SlotIndex, u8, u16)] {
+        &self.busy
+    }
+
     /// No result is pending and no unit busy, as after a reset.
     pub fn is_empty(&self) -> bool {
         self.pending.is_empty() && self.busy.is_empty()

@@ -3,7 +3,7 @@
 
 use crate::code::Operation;
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
-use takt_isa::Machine;
+use takt_isa::{Machine, Slot};
 
 /// Time along one path through the image, in cycles since the section began.
 #[derive(Clone, Debug)]
@@ -39,6 +39,45 @@ impl Clock {
             drained: 0,
             written: HashMap::new(),
         }
+    }
+
+    /// Clock of a path whose next bundle is delivered in cycle 0, with results in flight, by register, and busy units, by slot and number in
+    /// the slot: the cycles until each is there. As a register has one result in flight at most, its bank's write port is booked then, and
+    /// at no other time.
+    pub(crate) fn resume(
+        pending: &[(usize, u64)],
+        busy: &[((usize, usize), u64)],
+        machine: &Machine,
+    ) -> Clock {
+        let mut clock = Clock { delivered: 0, ..Clock::new(0, 0) };
+        for &(register, written) in pending {
+            let holds = |slot: &Slot| {
+                let base = usize::from(slot.bank.base);
+                (base..base + usize::from(slot.bank.depth)).contains(&register)
+            };
+            clock.booked.extend(machine.slots.iter().position(holds).map(|slot| (slot, written)));
+            clock.ready.insert(register, written);
+            clock.drained = clock.drained.max(written);
+        }
+        clock.free.extend(busy.iter().copied());
+        clock
+    }
+
+    /// First cycle in which the next bundle can issue.
+    pub(crate) fn delivered(&self) -> u64 {
+        self.delivered
+    }
+
+    /// Results in flight and busy units at the delivery of the next bundle, as for [`Clock::resume`], both ascending.
+    pub(crate) fn in_flight(&self) -> (Vec<(usize, u64)>, Vec<((usize, usize), u64)>) {
+        let now = self.delivered;
+        let pending = self.ready.iter().filter(|(_, cycle)| **cycle > now);
+        let mut pending: Vec<_> = pending.map(|(register, cycle)| (*register, cycle - now)).collect();
+        let busy = self.free.iter().filter(|(_, cycle)| **cycle > now);
+        let mut busy: Vec<_> = busy.map(|(unit, cycle)| (*unit, cycle - now)).collect();
+        pending.sort_unstable();
+        busy.sort_unstable();
+        (pending, busy)
     }
 
     /// Issues a bundle: in the first cycle in which every source is on its bus, no result for a destination is in flight, its units are

@@ -7,7 +7,7 @@ use foldhash::{HashMap, HashMapExt as _, HashSet};
 use takt_asm::Contraction;
 use takt_asm::plain::{PlainKind, PlainProgram};
 use takt_isa::program::Location;
-use takt_isa::{Effect, Function, Op, Program, Register, SlotIndex, fusions};
+use takt_isa::{BundleAddress, Effect, Function, Op, Program, Register, SlotIndex, fusions};
 
 /// An operation of either program.
 #[derive(Clone, Debug)]
@@ -197,33 +197,38 @@ pub(crate) fn of_source(
     Ok(Code::new(bundles, initial, (inputs, outputs), layout.labels.source.clone(), bounds, plain.period))
 }
 
+/// Converts a bundle of an image; an error is the reason why it cannot run.
+pub(crate) fn of_bundle(program: &Program, address: BundleAddress) -> Result<Vec<Operation>, String> {
+    let bundle = program.bundle(address).unwrap_or(Ok(Vec::new()));
+    let bundle = bundle.map_err(|(_, reason)| reason.to_string())?;
+    let operations = SlotIndex::all().zip(bundle).filter_map(|(slot, instruction)| {
+        let row = instruction.op.row();
+        (row.function != Function::Idle).then(|| Operation {
+            op: instruction.op,
+            dest: instruction.writes(program.machine.slot(slot)).map(Register::index),
+            sources: instruction.sources.map(Register::index),
+            constant: instruction.constant,
+            array: None,
+            location: program.operation_location(address, slot),
+            fused: ContractionRole::No,
+            timing: program.machine.slot(slot).unit_index(row.function).map(|unit| {
+                let times = program.machine.slot(slot).units[unit];
+                let (latency, interval) = (times.latency.into(), times.interval.into());
+                Timing { slot: slot.index(), unit, latency, interval }
+            }),
+        })
+    });
+    Ok(operations.collect())
+}
+
 /// Converts the image, with the locations of the source's declarations.
 pub(crate) fn of_image(program: &Program, layout: &Layout) -> Result<Code, Difference> {
     let mut bundles: Vec<Vec<Operation>> = Vec::new();
     for address in program.addresses() {
-        let location = program.location(address);
-        let bundle = program.bundle(address).unwrap_or(Ok(Vec::new())).map_err(|(_, reason)| Difference {
-            place: location,
+        bundles.push(of_bundle(program, address).map_err(|reason| Difference {
+            place: program.location(address),
             ..refuse(format!("bundle {address} cannot run: {reason}"))
-        })?;
-        let operations = SlotIndex::all().zip(bundle).filter_map(|(slot, instruction)| {
-            let row = instruction.op.row();
-            (row.function != Function::Idle).then(|| Operation {
-                op: instruction.op,
-                dest: instruction.writes(program.machine.slot(slot)).map(Register::index),
-                sources: instruction.sources.map(Register::index),
-                constant: instruction.constant,
-                array: None,
-                location: program.operation_location(address, slot),
-                fused: ContractionRole::No,
-                timing: program.machine.slot(slot).unit_index(row.function).map(|unit| {
-                    let times = program.machine.slot(slot).units[unit];
-                    let (latency, interval) = (times.latency.into(), times.interval.into());
-                    Timing { slot: slot.index(), unit, latency, interval }
-                }),
-            })
-        });
-        bundles.push(operations.collect());
+        })?);
     }
     let mut initial = vec![None; Register::COUNT];
     initial[Register::ZERO.index()] = Some(0);

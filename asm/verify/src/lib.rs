@@ -4,6 +4,7 @@
 //! The checker executes the plain program of the source ([`takt_asm::plain`]) and the image's words, both symbolically, and compares the
 //! observable effects: writes to ports, data memory, flags and states, and decisions. `docs/verify.md` lists the trusted parts.
 
+pub mod bound;
 mod clock;
 mod code;
 mod fields;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tests of the checker, one program: a module for each subject.
 
+mod bounds;
 mod common;
 mod fields;
 mod limits;

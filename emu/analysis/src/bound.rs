@@ -10,11 +10,13 @@
 //! A promised total of a loop's iterations, which no merged path can count, enters by Lagrangian relaxation ([`bound_with`]).
 //! `docs/analysis.md` has the argument.
 
+use crate::certificate::{Log, LoggedPlace};
 use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph, Loop};
 use crate::values::{MAX_VALUES, Slice, Values};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
+use takt_isa::certificate::{Certificate, Proof, Step};
 use takt_isa::program::{Location, SectionCycles};
 use takt_isa::timing::{self, Cycle, Residue, Scoreboard, Span};
 use takt_isa::{BundleAddress, Flow, Program, Register};
@@ -108,11 +110,28 @@ pub fn section_cycles(program: &Program) -> Result<Vec<SectionCycles>, String> {
 /// # Errors
 /// If a program cannot be bounded: see [`Refusal`].
 pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
-    let (mut bounds, prices) = bound_by(program, &Prices::new())?;
+    Ok(bound_proved(program, false)?.0)
+}
+
+/// Bounds of [`bound`], with a certificate that a checker can follow step by step.
+///
+/// # Errors
+/// If a program cannot be bounded: see [`Refusal`].
+pub fn certify(program: &Program) -> Result<(Bounds, Certificate), BoundError> {
+    let (bounds, proofs) = bound_proved(program, true)?;
+    let certificate = crate::certificate::certificate(program, &bounds, proofs);
+    Ok((bounds, certificate))
+}
+
+/// Bounds, and their proofs if `logged`.
+fn bound_proved(program: &Program, logged: bool) -> Result<(Bounds, Vec<Proof>), BoundError> {
+    let Found { mut bounds, prices, proof } = bound_by(program, &Prices::new(), logged)?;
     if prices.is_empty() {
-        return Ok(bounds);
+        return Ok((bounds, proof.into_iter().collect()));
     }
-    let (by_totals, _) = bound_by(program, &prices)?;
+    let by_totals = bound_by(program, &prices, logged)?;
+    let proofs = proof.into_iter().chain(by_totals.proof).collect();
+    let by_totals = by_totals.bounds;
     bounds.steps += by_totals.steps;
     let others: BTreeMap<_, _> =
         by_totals.sections.iter().map(|other| ((other.once, other.address), other)).collect();
@@ -134,32 +153,38 @@ pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
             spans.into_iter().for_each(|(span, other)| span.worst = span.worst.min(other.worst));
         }
     }
-    Ok(bounds)
+    Ok((bounds, proofs))
 }
 
 /// Price of an iteration in cycles, for each loop with a promised total, by the loop's head.
-type Prices = BTreeMap<BundleAddress, Cycle>;
+pub(crate) type Prices = BTreeMap<BundleAddress, Cycle>;
 
-/// Bounds and found iteration cycles ([`bound_with`]); forgets the values of loop counts if the analysis exceeds its steps with them.
-fn bound_by(program: &Program, prices: &Prices) -> Result<(Bounds, Prices), BoundError> {
+/// Result of an analysis: bounds, for each loop with a total the cycles of an iteration once iterations are alike, and the proof if logged.
+struct Found {
+    bounds: Bounds,
+    prices: Prices,
+    proof: Option<Proof>,
+}
+
+/// Result of [`bound_with`]; forgets the values of loop counts if the analysis exceeds its steps with them.
+fn bound_by(program: &Program, prices: &Prices, logged: bool) -> Result<Found, BoundError> {
     let slice = Slice::new(&Graph::new(program)?);
     let has_slice = !slice.is_empty();
-    match bound_with(program, slice, prices) {
+    match bound_with(program, slice, prices, logged) {
         // Without the values of counts, the states of iterations coincide much sooner.
         Err(BoundError { refusal: Refusal::Limit { limit: MAX_STEPS, .. }, .. }) if has_slice => {
-            bound_with(program, Slice::default(), prices)
+            bound_with(program, Slice::default(), prices, logged)
         }
         result => result,
     }
 }
 
-/// Bounds, tracking the registers of `slice`; also returns, for each loop with a total, the cycles of an iteration once iterations are
-/// alike.
+/// Analyses a program, tracking the registers of `slice`.
 ///
 /// Lagrangian relaxation of the promised totals: each iteration of a loop with a price costs its cycles less the price, and a section that
 /// enters the loop pays the price times the total. At any price the result bounds every path that keeps to the total; at a price equal to
 /// the cycles of a steady iteration, it is the longest such path.
-fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bounds, Prices), BoundError> {
+fn bound_with(program: &Program, slice: Slice, prices: &Prices, logged: bool) -> Result<Found, BoundError> {
     let graph = Graph::new(program)?;
     let machine = program.machine;
     let at_reset = slice.at_reset(program);
@@ -173,6 +198,7 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
         orders: HashMap::new(),
         active: Vec::new(),
         steps: 0,
+        log: logged.then(|| Log::new(prices)),
     };
     // Worklist over sections and their timing states at entry. A period's tick may come any time after the `wait`, so results may
     // still be pending or not when its first bundle is delivered: each such state, up to the empty one, is analysed (`delivered`). The
@@ -193,16 +219,21 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
             let region = Region::Subroutine(address);
             // A period may begin with any register values that another period has left.
             let values = if once { at_reset.clone() } else { Values::default() };
-            let summary = explorer.explore(region, &State { residue, values, published: false })?;
-            if summary.calls > machine.stack_depth {
-                let refusal = Refusal::StackOverflow { needed: summary.calls, depth: machine.stack_depth };
+            let state = State { residue, values, published: false };
+            let summary = explorer.explore(region, &state)?;
+            if let Some(log) = &mut explorer.log {
+                log.enter(once, address, &state, later == 0, summary.number);
+            }
+            let Needs { calls, counted, .. } = summary.needs;
+            if calls > machine.stack_depth {
+                let refusal = Refusal::StackOverflow { needed: calls, depth: machine.stack_depth };
                 return Err(BoundError::new(program, address, refusal));
             }
-            if summary.counted > machine.loop_depth {
-                let refusal = Refusal::LoopOverflow { needed: summary.counted, depth: machine.loop_depth };
+            if counted > machine.loop_depth {
+                let refusal = Refusal::LoopOverflow { needed: counted, depth: machine.loop_depth };
                 return Err(BoundError::new(program, address, refusal));
             }
-            let totals = explorer.totals(&summary);
+            let totals = explorer.totals(&summary.needs);
             let publishes = summary.outcomes.keys().any(|outcome| matches!(outcome, Outcome::Publish { .. }));
             for (outcome, cost) in &summary.outcomes {
                 let span = cost.span(totals);
@@ -274,8 +305,9 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bound
     for (key, section) in &mut sections {
         section.published = publications.get(key).copied();
     }
-    let Explorer { steps, found, .. } = explorer;
-    Ok((Bounds { sections: sections.into_values().collect(), steps }, found))
+    let Explorer { steps, found, log, .. } = explorer;
+    let bounds = Bounds { sections: sections.into_values().collect(), steps };
+    Ok(Found { bounds, prices: found, proof: log.map(Log::proof) })
 }
 
 fn name(program: &Program, once: bool, address: BundleAddress) -> String {
@@ -288,13 +320,13 @@ fn name(program: &Program, once: bool, address: BundleAddress) -> String {
 
 /// Least and most cycles of a part of a path. The most is negative where iterations in it have a price above their cycles.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Cost {
-    best: Cycle,
-    worst: i64,
+pub(crate) struct Cost {
+    pub(crate) best: Cycle,
+    pub(crate) worst: i64,
 }
 
 impl Cost {
-    const ZERO: Cost = Cost { best: 0, worst: 0 };
+    pub(crate) const ZERO: Cost = Cost { best: 0, worst: 0 };
 
     const fn exactly(cycles: Cycle) -> Cost {
         Cost { best: cycles, worst: cycles.cast_signed() }
@@ -317,10 +349,17 @@ impl Cost {
 
 /// State of a path: its timing state, the known values of the registers that loop counts depend on, and whether a `publish` has issued.
 #[derive(Clone, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-struct State {
-    residue: Residue,
-    values: Values,
-    published: bool,
+pub(crate) struct State {
+    pub(crate) residue: Residue,
+    pub(crate) values: Values,
+    pub(crate) published: bool,
+}
+
+impl State {
+    /// The state without the values of registers, or a count.
+    pub(crate) fn forgotten(&self) -> State {
+        State { values: Values::default(), ..self.clone() }
+    }
 }
 
 /// Part of the program that is analysed as a unit, entered at one bundle.
@@ -337,7 +376,7 @@ enum Region {
 /// Exit of a region. Its residue is the timing state at the delivery of the next bundle, up to which its cycles are counted. The cycles of
 /// `wait` and `halt` are counted up to their issue.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum Outcome {
+pub(crate) enum Outcome {
     /// Edge to a bundle outside of the loop or, from an iteration, also back to the loop's head.
     Go {
         edge: Edge,
@@ -365,8 +404,16 @@ enum Outcome {
 
 /// Summary of a region for one timing state at entry: its exits, each with its cycles.
 #[derive(Default, Debug)]
-struct Summary {
-    outcomes: BTreeMap<Outcome, Cost>,
+pub(crate) struct Summary {
+    pub(crate) outcomes: BTreeMap<Outcome, Cost>,
+    needs: Needs,
+    /// Number of its lemma in the certificate, if one is made.
+    pub(crate) number: u32,
+}
+
+/// Resources that a part of the program needs.
+#[derive(Default, Debug)]
+struct Needs {
     /// Most entries of the return stack in use.
     calls: u32,
     /// Deepest nesting of loops counted by the sequencer.
@@ -375,17 +422,21 @@ struct Summary {
     priced: BTreeSet<BundleAddress>,
 }
 
-impl Summary {
-    fn add(&mut self, outcome: Outcome, cost: Cost) {
-        add(&mut self.outcomes, outcome, cost);
-    }
-
-    /// Takes over the resource needs (not the cycles) of another part of the program.
-    fn contain(&mut self, part: &Summary) {
+impl Needs {
+    /// Takes over the needs of another part of the program.
+    fn contain(&mut self, part: &Needs) {
         self.calls = self.calls.max(part.calls);
         self.counted = self.counted.max(part.counted);
         self.priced.extend(&part.priced);
     }
+}
+
+/// Part of a path from one bundle: straight-line code, with the callee of a call, or a loop.
+struct Piece {
+    step: Step,
+    /// Ways on, in the order of [`takt_isa::certificate::Place::edges`]; `None` is one that is never taken.
+    edges: Vec<Option<(Outcome, Cost)>>,
+    needs: Needs,
 }
 
 fn add<K: Ord>(costs: &mut BTreeMap<K, Cost>, key: K, cost: Cost) {
@@ -417,6 +468,7 @@ struct Explorer<'p> {
     orders: HashMap<Region, Rc<HashMap<BundleAddress, usize>>>,
     active: Vec<Region>,
     steps: u64,
+    log: Option<Log>,
 }
 
 impl Explorer<'_> {
@@ -435,7 +487,7 @@ impl Explorer<'_> {
     }
 
     /// Cycles that the totals of a section's loops cost: price times total.
-    fn totals(&self, section: &Summary) -> Cycle {
+    fn totals(&self, section: &Needs) -> Cycle {
         let of = |head: &BundleAddress| {
             self.prices[head].saturating_mul(self.graph.loops[head].total.unwrap_or(0).into())
         };
@@ -479,15 +531,20 @@ impl Explorer<'_> {
         let mut summary = Summary::default();
         let first = State { values: Values { count: None, ..entry.values.clone() }, ..entry.clone() };
         let mut heads = BTreeMap::from([(first, Cost::ZERO)]);
-        summary.priced.extend(price.map(|_| head));
+        summary.needs.priced.extend(price.map(|_| head));
         let price = price.unwrap_or(0).cast_signed();
+        let (mut logged, mut recurrence) = (Vec::new(), None);
         for turn in 1..=most {
             let mut next: BTreeMap<State, Cost> = BTreeMap::new();
             let mut left: Vec<(Outcome, Cost)> = Vec::new();
+            let mut places = Vec::new();
             for (state, before) in &heads {
                 self.step(head)?;
                 let one = self.explore(Region::Turn(head), state)?;
-                summary.contain(&one);
+                summary.needs.contain(&one.needs);
+                if self.log.is_some() {
+                    places.push((state.clone(), *before, Rc::clone(&one)));
+                }
                 for (outcome, cost) in &one.outcomes {
                     let cost = before.and(Cost { worst: cost.worst - price, ..*cost });
                     match outcome {
@@ -521,14 +578,27 @@ impl Explorer<'_> {
                     best: best.saturating_mul(soonest.into()),
                     worst: worst.saturating_mul(costliest.into()),
                 };
-                summary.add(outcome, cost.and(more));
+                add(&mut summary.outcomes, outcome, cost.and(more));
+            }
+            logged.push(places);
+            if steady {
+                recurrence = Some(Cost { best, worst });
             }
             if next.is_empty() || steady {
                 break;
             }
             heads = widened(next);
         }
-        summary.counted += u32::from(counted);
+        summary.needs.counted += u32::from(counted);
+        if let Some(log) = &mut self.log {
+            let last = logged.len() as u32;
+            let is_never = |turn: u32, outcome: &Outcome| match outcome {
+                Outcome::Go { edge, .. } if *edge == again => turn == most,
+                Outcome::Go { .. } => counted && turn < least && !(recurrence.is_some() && turn == last),
+                _ => false,
+            };
+            summary.number = log.turns(again, entry, &logged, recurrence, is_never, &summary.outcomes);
+        }
         Ok(summary)
     }
 
@@ -537,18 +607,19 @@ impl Explorer<'_> {
     fn ways(&mut self, region: Region, entry: BundleAddress, state: &State) -> Result<Summary, BoundError> {
         let order = self.order(region, entry)?;
         let mut summary = Summary::default();
+        let mut places = Vec::new();
         let mut left =
             BTreeMap::from([((order[&entry], entry), BTreeMap::from([(state.clone(), Cost::ZERO)]))]);
         while let Some(((_, address), states)) = left.pop_first() {
             for (state, before) in widened(states) {
-                let here = if self.graph.loops.contains_key(&address) && region != Region::Turn(address) {
+                let piece = if self.graph.loops.contains_key(&address) && region != Region::Turn(address) {
                     self.inner(Region::Loop(address), &state)?
                 } else {
                     self.step(address)?;
-                    Rc::new(self.run(address, &state)?)
+                    self.run(address, &state)?
                 };
-                summary.contain(&here);
-                for (outcome, cost) in &here.outcomes {
+                summary.needs.contain(&piece.needs);
+                for (outcome, cost) in piece.edges.iter().flatten() {
                     let cost = before.and(*cost);
                     match outcome {
                         Outcome::Go { edge, state } if self.stays(region, edge.to) => {
@@ -560,16 +631,27 @@ impl Explorer<'_> {
                         _ => add(&mut summary.outcomes, outcome.clone(), cost),
                     }
                 }
+                if self.log.is_some() {
+                    places.push(LoggedPlace {
+                        at: address,
+                        state,
+                        before,
+                        step: piece.step,
+                        edges: piece.edges,
+                    });
+                }
             }
+        }
+        if self.log.is_some() {
+            let stays = |to| self.stays(region, to);
+            let targets = LoggedPlace::targets(&places, stays, &summary.outcomes);
+            summary.number = self.log.as_mut().map_or(0, |log| log.code(places, targets, &summary.outcomes));
         }
         Ok(summary)
     }
 
-    /// Summary of a loop within a region. Only the registers that the loop uses enter the summary's key; the other values pass unchanged.
-    fn inner(&mut self, region: Region, state: &State) -> Result<Rc<Summary>, BoundError> {
-        if self.slice.is_empty() {
-            return self.explore(region, state);
-        }
+    /// Loop within a region. Only the registers that the loop uses enter the summary's key; the other values pass unchanged.
+    fn inner(&mut self, region: Region, state: &State) -> Result<Piece, BoundError> {
         let (Region::Subroutine(head) | Region::Loop(head) | Region::Turn(head)) = region;
         let used = self
             .used
@@ -579,16 +661,20 @@ impl Explorer<'_> {
         self.used.insert(region, Rc::clone(&used));
         let values = Values { count: state.values.count, ..state.values.of(&used) };
         let inside = self.explore(region, &State { values, ..state.clone() })?;
-        let mut summary = Summary::default();
-        summary.contain(&inside);
-        for (outcome, cost) in &inside.outcomes {
+        let mut needs = Needs::default();
+        needs.contain(&inside.needs);
+        let edge = |(outcome, cost): (&Outcome, &Cost)| {
             let mut outcome = outcome.clone();
             if let Outcome::Go { state: after, .. } | Outcome::Return { state: after, .. } = &mut outcome {
                 after.values = state.values.with(&used, &after.values);
             }
-            summary.add(outcome, *cost);
-        }
-        Ok(Rc::new(summary))
+            Some((outcome, *cost))
+        };
+        Ok(Piece {
+            step: Step::Loop(inside.number),
+            edges: inside.outcomes.iter().map(edge).collect(),
+            needs,
+        })
     }
 
     /// The edge to this bundle stays in the region; an edge to the head of a loop leaves the iteration.
@@ -599,13 +685,12 @@ impl Explorer<'_> {
         }
     }
 
-    /// Summary of straight-line code: from a bundle to the next one that branches or is a branch target. A call's callee is included.
-    fn run(&mut self, entry: BundleAddress, state: &State) -> Result<Summary, BoundError> {
+    /// Straight-line code: from a bundle to the next one that branches or is a branch target. A call's callee is included.
+    fn run(&mut self, entry: BundleAddress, state: &State) -> Result<Piece, BoundError> {
         let machine = self.graph.program.machine;
         let mut scoreboard = Scoreboard::resume(machine, &state.residue);
         let mut values = state.values.clone();
         let (mut address, mut delivered) = (entry, 0);
-        let mut summary = Summary::default();
         let (at, cycle, flow, taken, closes) = loop {
             let node = self.graph.node(address)?;
             let cycle = scoreboard.issue(&node.timing, address, delivered).cycle;
@@ -628,34 +713,32 @@ impl Explorer<'_> {
             (address, delivered) = (address.next(), timing::after_sequential(cycle));
         };
         let published = state.published || flow == Flow::Publish;
-        let mut go = |to, back, delivered| {
+        let go = |to, back, delivered| {
             let state = State { residue: scoreboard.residue(delivered), values: values.clone(), published };
-            summary.add(Outcome::Go { edge: Edge { to, back }, state }, Cost::exactly(delivered));
+            Some((Outcome::Go { edge: Edge { to, back }, state }, Cost::exactly(delivered)))
         };
+        let last = at.get();
+        let (mut step, mut needs) = (Step::To(last), Needs::default());
         let redirected = timing::after_redirect(machine, cycle);
-        match flow {
-            Flow::Next => go(at.next(), false, timing::after_sequential(cycle)),
+        let edges = match flow {
+            Flow::Next => vec![go(at.next(), false, timing::after_sequential(cycle))],
             Flow::Publish => {
-                go(at.next(), false, timing::after_sequential(cycle));
+                let mut edges = vec![go(at.next(), false, timing::after_sequential(cycle))];
                 if !state.published {
-                    summary.add(Outcome::Publish { at }, Cost::exactly(cycle));
+                    edges.push(Some((Outcome::Publish { at }, Cost::exactly(cycle))));
                 }
+                edges
             }
-            Flow::Loop { end, .. } => go(at.next(), false, timing::after_loop(machine, at, end, cycle)),
+            Flow::Loop { end, .. } => vec![go(at.next(), false, timing::after_loop(machine, at, end, cycle))],
             Flow::LoopEnd => {
-                if let Some(head) = closes {
-                    go(head, true, timing::after_sequential(cycle));
-                }
-                go(at.next(), false, timing::after_sequential(cycle));
+                let back = closes.and_then(|head| go(head, true, timing::after_sequential(cycle)));
+                vec![back, go(at.next(), false, timing::after_sequential(cycle))]
             }
-            Flow::Jump(target) => go(target, target <= at, redirected),
+            Flow::Jump(target) => vec![go(target, target <= at, redirected)],
             Flow::Branch { target, .. } => {
-                if taken != Some(false) {
-                    go(target, target <= at, redirected);
-                }
-                if taken != Some(true) {
-                    go(at.next(), false, timing::after_not_taken(machine, cycle));
-                }
+                let is_taken = go(target, target <= at, redirected).filter(|_| taken != Some(false));
+                let next = go(at.next(), false, timing::after_not_taken(machine, cycle));
+                vec![is_taken, next.filter(|_| taken != Some(true))]
             }
             Flow::Call(target) => {
                 if self.active.contains(&Region::Subroutine(target)) {
@@ -664,8 +747,10 @@ impl Explorer<'_> {
                 }
                 let state = State { residue: scoreboard.residue(redirected), values, published };
                 let callee = self.explore(Region::Subroutine(target), &state)?;
-                summary.contain(&callee);
-                summary.calls = callee.calls + 1;
+                needs.contain(&callee.needs);
+                needs.calls = callee.needs.calls + 1;
+                step = Step::Call(last, callee.number);
+                let mut edges = Vec::new();
                 for (outcome, cost) in &callee.outcomes {
                     let outcome = match outcome {
                         Outcome::Return { state, .. } => {
@@ -676,20 +761,21 @@ impl Explorer<'_> {
                             outcome.clone()
                         }
                     };
-                    summary.add(outcome, cost.and(Cost::exactly(redirected)));
+                    edges.push(Some((outcome, cost.and(Cost::exactly(redirected)))));
                 }
+                edges
             }
             Flow::Return => {
                 let state = State { residue: scoreboard.residue(redirected), values, published };
-                summary.add(Outcome::Return { at, state }, Cost::exactly(redirected));
+                vec![Some((Outcome::Return { at, state }, Cost::exactly(redirected)))]
             }
             Flow::Wait(target) => {
                 let residue = scoreboard.residue(redirected);
-                summary.add(Outcome::Wait { at, target, residue, published }, Cost::exactly(cycle));
+                vec![Some((Outcome::Wait { at, target, residue, published }, Cost::exactly(cycle)))]
             }
-            Flow::Halt => summary.add(Outcome::Halt { at }, Cost::exactly(cycle)),
-        }
-        Ok(summary)
+            Flow::Halt => vec![Some((Outcome::Halt { at }, Cost::exactly(cycle)))],
+        };
+        Ok(Piece { step, edges, needs })
     }
 
     /// Numbers the bundles of a region in topological order. A counted loop inside it is a single node; any other cycle is an error, since

@@ -14,6 +14,7 @@
 
 pub mod accuracy;
 pub mod bound;
+mod certificate;
 mod chain;
 pub mod dependence;
 mod error;
@@ -27,7 +28,7 @@ mod trace;
 mod values;
 pub mod what_if;
 
-pub use bound::{Bounds, Publication, SectionBounds, bound, section_cycles};
+pub use bound::{Bounds, Publication, SectionBounds, bound, certify, section_cycles};
 pub use chain::{EdgeSlots, Loop};
 pub use error::{BoundError, Refusal};
 pub use limit::limit;
