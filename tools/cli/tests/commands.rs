@@ -733,6 +733,60 @@ fn options(text: &str) -> Vec<&str> {
     options.map(|word| if word.starts_with("--") { word } else { &word[..2] }).collect()
 }
 
+/// A certificate proves the bounds that are printed; a changed one, or one of another program, is refused with status 1 and the place.
+#[test]
+fn bounds_are_certified_and_checked() {
+    let folder = Folder::new();
+    let law = ".input n:int, x\n.output y\n.reg k:int\n.period\np: li k, 4\n.loop_bound 4\nnext: isub k, k, 1\n bnz k, next\n \
+               bz n, skip\n fdiv y, x, x\nskip: wait p\n";
+    folder.write("law.s", law);
+    folder.write("other.s", law.replace("fdiv", "fmul"));
+    let bounds = folder.line("bound law.s").ok();
+    assert_eq!(folder.line("bound law.s --certificate law.json").ok(), bounds);
+    let json = folder.line("bound law.s --json").ok();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let proved = folder.line("verify --bound law.json law.s").ok();
+    let worst = json["sections"][0]["cycles"]["worst"].to_string();
+    assert!(proved.starts_with("proved: ") && proved.contains(&format!("{worst}\n")), "{proved}");
+    folder.line("asm law.s").ok();
+    assert_eq!(folder.line("verify law.takt --bound law.json").ok(), proved, "an image, too");
+    let json = folder.line("verify --bound law.json law.s --json").ok();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["proved"], true);
+    assert_eq!(json["sections"].as_array().map(Vec::len), Some(2));
+
+    let refused = |line: &str| {
+        let done = folder.line(line);
+        assert_eq!(done.status, Some(1), "{line}: {}", done.stderr);
+        done.stdout + &done.stderr
+    };
+    assert!(refused("verify --bound law.json other.s").contains("not proved: the certificate is of another"));
+    assert!(refused("verify --bound law.json law.s -m t1").contains("is for machine `t3`"));
+    let text = folder.read_text("law.json");
+    let worst = text.find("\"pending\":[[").unwrap();
+    let changed = text[worst..].find(']').map(|at| worst + at).unwrap();
+    folder.write("less.json", format!("{}9{}", &text[..changed], &text[changed..]));
+    let shown = refused("verify --bound less.json law.s");
+    assert!(shown.starts_with("not proved: "), "{shown}");
+    let json: serde_json::Value =
+        serde_json::from_str(&refused("verify --bound less.json law.s --json")).unwrap();
+    assert_eq!(json["proved"], false);
+    folder.write("cut.json", &text[..text.len() / 2]);
+    assert!(refused("verify --bound cut.json law.s").contains("not proved: this is no certificate: EOF"));
+    folder.write("endless.s", ".input n:int\na: bnz n, a\n halt\n");
+    assert!(refused("bound endless.s --certificate endless.json").contains("has no bound"));
+    for (line, why) in [
+        ("verify --bound law.json law.s law.takt", "expected one program"),
+        ("verify law.s", "has no source: expected pairs"),
+        ("bound law.s --certificate law.s", "law.s"),
+    ] {
+        let done = folder.line(line);
+        assert!(done.status == Some(2) && done.stderr.contains(why), "{line}: {}", done.stderr);
+    }
+    let files = ["cut.json", "endless.s", "law.json", "law.s", "law.takt", "less.json", "other.s"];
+    assert_eq!(folder.list(), files);
+}
+
 /// Commands that a help text lists.
 fn commands(help: &str) -> Vec<&str> {
     let list = help.split_once("\nUsage: ").unwrap().1.split_once("\nOptions:\n").unwrap().0;

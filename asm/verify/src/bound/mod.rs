@@ -14,7 +14,7 @@ use takt_isa::certificate::{self, Certificate, Claim, Cycles, Edge, End, Exit, F
 use takt_isa::certificate::{Step, Target, Times, Turn, fingerprint};
 
 /// Limit on the length of a certificate in bytes.
-pub const MAX_BYTES: u64 = 1 << 28;
+pub const MAX_BYTES: u64 = 1 << 26;
 /// Limit on the bundles that a check executes.
 pub const MAX_BUNDLES: u64 = 1 << 27;
 

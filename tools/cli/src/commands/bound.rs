@@ -2,6 +2,7 @@
 //! The command `takt bound`: best and worst case of each section of each core, by static analysis; for a system, also the latencies from
 //! the host's inputs to its outputs.
 
+mod certificate;
 mod groups;
 pub(crate) mod paths;
 #[cfg(feature = "board")]
@@ -61,6 +62,9 @@ pub(crate) struct Bound {
     #[cfg(feature = "board")]
     #[arg(long, value_name = "BOARD", requires = "pins")]
     board: Option<String>,
+    /// Write a proof of the bounds of a program to this file, which `takt verify --bound` checks (docs/verify.md).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) certificate: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
     pub(crate) json: bool,
@@ -70,6 +74,7 @@ const EXAMPLES: &str = "\
 Examples:
   takt bound prog.s                                  best and worst of every section
   takt bound prog.s --deadline 100us --clock 125MHz  for CI: status 1 if a period can take longer
+  takt bound prog.s --certificate prog.json          with a proof, for `takt verify --bound prog.json prog.s`
   takt bound robot.s --pins --wiring robot.toml      from an encoder's edge to a PWM's, on a board
   takt bound system.toml                             of each core, and from the host's inputs to outputs
   takt bound axis.toml --pins --wiring wiring.toml   over a system's cores and links, from pin to pin";
@@ -88,13 +93,21 @@ impl Verdict {
 }
 
 pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
-    files::check(&[("FILE", &arguments.file)], &[])?;
+    let writes: Vec<_> = arguments.certificate.iter().map(|path| ("--certificate", path.as_path())).collect();
+    files::check(&[("FILE", &arguments.file)], &writes)?;
     let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
     if arguments.empty_fifos && application.system().is_none() {
         let why = "--empty-fifos is for systems, which have FIFOs between their cores";
         return Err(Failure::Usage(why.to_owned()).into());
     }
+    if arguments.certificate.is_some() && application.system().is_some() {
+        let why = "--certificate is of one program: bound the program of each core";
+        return Err(Failure::Usage(why.to_owned()).into());
+    }
     let bounds = application.bounds()?;
+    if let (Some(path), Application::Program(loaded)) = (&arguments.certificate, &application) {
+        certificate::write(path, &loaded.program, &bounds[0])?;
+    }
     let deadline = arguments.deadline.map(|deadline| deadline.cycles(arguments.clock));
     #[cfg(feature = "board")]
     if let Some(wiring) = &arguments.wiring {

@@ -21,28 +21,36 @@ use std::time::Duration;
 use takt_asm::image;
 use takt_asm::limits::IMAGE_BYTES;
 use takt_asm::plain::PlainProgram;
+use takt_isa::certificate::Times;
 use takt_isa::program::Location;
+use takt_isa::text::visible;
 use takt_isa::{MACHINES, Program};
+use takt_verify::bound::{self, ProvedBounds, Unproved};
 use takt_verify::{Difference, EquivalenceReport};
 use takt_work::Unit;
 
 /// Check that an image does what its source says, for every input and on every path.
 ///
 /// An independent checker executes both symbolically, and compares every write to a port, store, flag and state, bit for bit. It
-/// shows sums that are fused with a product, and compares the cycles of sections with its own statement of the rules of issue.
+/// shows sums that are fused with a product, and compares the cycles of sections with its own statement of the rules of issue. With --bound, it checks the proof of the bounds of a
+/// program instead.
 #[derive(Args)]
 #[command(after_help = "\
-Exit status: 0 if every image is its source; 1 if one differs, or if that cannot be excluded.
+Exit status: 0 if every image is its source, or the bounds are proved; 1 if one differs, or if that cannot be excluded.
 
 Examples:
   takt verify prog.takt prog.s          the image that `takt asm prog.s` wrote
   takt verify prog.takt prog.s --json   the result for a script
   takt verify a.takt a.s b.takt b.s --hq-server ~/server   several, on the workers of a HyperQueue server
-  takt asm prog.s --verify              assemble and check at once")]
+  takt asm prog.s --verify              assemble and check at once
+  takt verify --bound prog.json prog.s  the certificate that `takt bound prog.s --certificate prog.json` wrote")]
 pub(crate) struct Verify {
-    /// Image, and its source, which may be `-`, standard input; or several such pairs.
-    #[arg(required = true, num_args = 2.., value_names = ["IMAGE", "SOURCE"])]
+    /// Image, and its source, which may be `-`, standard input; or several such pairs. With --bound: one program, a source or an image.
+    #[arg(required = true, num_args = 1.., value_names = ["IMAGE", "SOURCE"])]
     files: Vec<PathBuf>,
+    /// Check this certificate of bounds, which `takt bound --certificate` has written, against the program (docs/verify.md).
+    #[arg(long, value_name = "CERTIFICATE")]
+    bound: Option<PathBuf>,
     #[command(flatten)]
     machine: OptionalMachine,
     #[command(flatten)]
@@ -66,6 +74,9 @@ struct Report {
 }
 
 pub(crate) fn run(arguments: &Verify, color: bool, out: &mut Out) -> Result<()> {
+    if let Some(certificate) = &arguments.bound {
+        return arguments.bounds(certificate, color, out);
+    }
     let names = ["IMAGE", "SOURCE"].into_iter().cycle();
     let reads: Vec<_> = names.zip(arguments.files.iter().map(PathBuf::as_path)).collect();
     files::check(&reads, &[])?;
@@ -96,6 +107,28 @@ pub(crate) fn run(arguments: &Verify, color: bool, out: &mut Out) -> Result<()> 
 }
 
 impl Verify {
+    /// Checks a certificate of bounds.
+    fn bounds(&self, certificate: &Path, color: bool, out: &mut Out) -> Result<()> {
+        let [file] = &self.files[..] else {
+            let text = "with --bound, expected one program, of which the certificate is";
+            return Err(Failure::Usage(text.to_owned()).into());
+        };
+        if self.work.uses_server() {
+            let text = "a certificate is checked here: --bound takes no server";
+            return Err(Failure::Usage(text.to_owned()).into());
+        }
+        files::check(&[("FILE", file), ("--bound", certificate)], &[])?;
+        let program = Load::new(self.machine.machine, color).with(&self.arguments).program(file)?;
+        let text = files::read(certificate, usize::try_from(bound::MAX_BYTES).unwrap_or(usize::MAX))?;
+        let result = bound::check(&program, &text);
+        if self.json {
+            files::json(&bounds_json(&result), out)?;
+        } else {
+            write_bounds(&result, out)?;
+        }
+        if result.is_ok() { Ok(()) } else { Err(Failure::Reported.into()) }
+    }
+
     /// Checks several images, in threads of this process or in units; a result is the reason where an image cannot be checked.
     fn all(&self, pairs: &[(PathBuf, PathBuf)], color: bool) -> Result<Vec<Result<Report, String>>> {
         static STOPPED: AtomicBool = AtomicBool::new(false);
@@ -176,6 +209,50 @@ impl Verify {
         let text = String::from_utf8_lossy(&text).into_owned();
         Ok(Report { is_proved: result.is_proved(), text, json: result.json() })
     }
+}
+
+fn bounds_json(result: &Result<ProvedBounds, Unproved>) -> Value {
+    match result {
+        Ok(ProvedBounds { sections, lemmas, places, bundles }) => json!({
+            "proved": true,
+            "sections": sections,
+            "lemmas": lemmas,
+            "places": places,
+            "bundles": bundles,
+        }),
+        Err(Unproved { part, bundle, what }) => {
+            json!({ "proved": false, "reason": what, "bundle": bundle, "part": part })
+        }
+    }
+}
+
+fn write_bounds(result: &Result<ProvedBounds, Unproved>, out: &mut Out) -> Result<()> {
+    let proved = match result {
+        Ok(proved) => proved,
+        Err(reason) => return Ok(writeln!(out, "not proved: {reason}")?),
+    };
+    let text = |(best, worst): (u64, u64)| match best == worst {
+        true => worst.to_string(),
+        false => format!("{best} to {worst}"),
+    };
+    writeln!(out, "proved: these cycles hold on every path, for all inputs")?;
+    for section in &proved.sections {
+        let Times { refilled, in_time, missed } = section.cycles;
+        write!(out, "  {}: {}", visible(&section.name), text(refilled))?;
+        if let (Some(in_time), Some(missed)) = (in_time, missed) {
+            write!(
+                out,
+                "; {} if the tick comes soon after the wait, {} after a missed deadline",
+                text(in_time),
+                text(missed)
+            )?;
+        }
+        if let Some(published) = section.published {
+            write!(out, "; outputs published after {}", text(published.refilled))?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
 }
 
 /// Outcome of a check.

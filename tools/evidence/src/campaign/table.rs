@@ -129,6 +129,19 @@ pub(super) const CAMPAIGNS: &[Campaign] = &[
         Runs::Test("takt-verify", "random::random_programs", "TAKT_PROGRAMS"),
     ),
     Campaign::of(
+        "bounds",
+        "`takt verify` proves the bounds of every random program, and runs keep to them",
+        "programs",
+        5000,
+        20,
+        1,
+        Runs::Test(
+            "takt-verify",
+            "bounds::random_programs_have_their_bounds_proved_and_keep_to_them",
+            "TAKT_PROGRAMS",
+        ),
+    ),
+    Campaign::of(
         "images",
         "`takt verify` refuses every changed image that does something else on the emulator",
         "mutants",
