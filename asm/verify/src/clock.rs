@@ -5,6 +5,30 @@ use crate::code::Operation;
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 use takt_isa::{Machine, Slot};
 
+/// Results in flight, by register, and busy units, by slot and number in the slot: with the cycles until each is there. Both are
+/// ascending.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct InFlight {
+    pub(crate) pending: Vec<(usize, u64)>,
+    pub(crate) busy: Vec<((usize, usize), u64)>,
+}
+
+impl InFlight {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.pending.is_empty() && self.busy.is_empty()
+    }
+
+    /// State a cycle later, if nothing issues.
+    pub(crate) fn a_cycle_later(&self) -> InFlight {
+        let pending = self.pending.iter().map(|(register, left)| (*register, left - 1));
+        let busy = self.busy.iter().map(|(unit, left)| (*unit, left - 1));
+        InFlight {
+            pending: pending.filter(|(_, left)| *left > 0).collect(),
+            busy: busy.filter(|(_, left)| *left > 0).collect(),
+        }
+    }
+}
+
 /// Time along one path through the image, in cycles since the section began.
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {
@@ -41,16 +65,11 @@ impl Clock {
         }
     }
 
-    /// Clock of a path whose next bundle is delivered in cycle 0, with results in flight, by register, and busy units, by slot and number in
-    /// the slot: the cycles until each is there. As a register has one result in flight at most, its bank's write port is booked then, and
-    /// at no other time.
-    pub(crate) fn resume(
-        pending: &[(usize, u64)],
-        busy: &[((usize, usize), u64)],
-        machine: &Machine,
-    ) -> Clock {
+    /// Clock of a path whose next bundle is delivered in cycle 0. As a register has one result in flight at most, its bank's write port is
+    /// booked in the cycle of that result, and in no other.
+    pub(crate) fn resume(time: &InFlight, machine: &Machine) -> Clock {
         let mut clock = Clock { delivered: 0, ..Clock::new(0, 0) };
-        for &(register, written) in pending {
+        for &(register, written) in &time.pending {
             let holds = |slot: &Slot| {
                 let base = usize::from(slot.bank.base);
                 (base..base + usize::from(slot.bank.depth)).contains(&register)
@@ -59,7 +78,7 @@ impl Clock {
             clock.ready.insert(register, written);
             clock.drained = clock.drained.max(written);
         }
-        clock.free.extend(busy.iter().copied());
+        clock.free.extend(time.busy.iter().copied());
         clock
     }
 
@@ -68,8 +87,8 @@ impl Clock {
         self.delivered
     }
 
-    /// Results in flight and busy units at the delivery of the next bundle, as for [`Clock::resume`], both ascending.
-    pub(crate) fn in_flight(&self) -> (Vec<(usize, u64)>, Vec<((usize, usize), u64)>) {
+    /// Results in flight and busy units at the delivery of the next bundle.
+    pub(crate) fn in_flight(&self) -> InFlight {
         let now = self.delivered;
         let pending = self.ready.iter().filter(|(_, cycle)| **cycle > now);
         let mut pending: Vec<_> = pending.map(|(register, cycle)| (*register, cycle - now)).collect();
@@ -77,7 +96,7 @@ impl Clock {
         let mut busy: Vec<_> = busy.map(|(unit, cycle)| (*unit, cycle - now)).collect();
         pending.sort_unstable();
         busy.sort_unstable();
-        (pending, busy)
+        InFlight { pending, busy }
     }
 
     /// Issues a bundle: in the first cycle in which every source is on its bus, no result for a destination is in flight, its units are

@@ -5,8 +5,9 @@
 mod flow;
 mod path;
 
+use crate::clock::InFlight;
 use flow::{Flow, LoopCount};
-use path::{Cost, InFlight, State, Touched, Way, line};
+use path::{Cost, State, Touched, Way, line};
 use std::collections::BTreeMap;
 use std::fmt;
 use takt_isa::Program;

@@ -2,36 +2,13 @@
 //! Execution of a straight line from a claimed state, by the check's own rules of issue.
 
 use super::flow::{Flow, redirecting};
-use crate::clock::Clock;
+use crate::clock::{Clock, InFlight};
 use crate::code::Operation;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::certificate::{self, End};
 use takt_isa::fp::Host;
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::{Effect, Machine, Register, compute};
-
-/// Results in flight, by register, and busy units, by slot and number in the slot: with the cycles until each is there.
-#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct InFlight {
-    pub(super) pending: Vec<(usize, u64)>,
-    pub(super) busy: Vec<((usize, usize), u64)>,
-}
-
-impl InFlight {
-    pub(super) fn is_empty(&self) -> bool {
-        self.pending.is_empty() && self.busy.is_empty()
-    }
-
-    /// State a cycle later, if nothing issues.
-    pub(super) fn a_cycle_later(&self) -> InFlight {
-        let pending = self.pending.iter().map(|(register, left)| (*register, left - 1));
-        let busy = self.busy.iter().map(|(unit, left)| (*unit, left - 1));
-        InFlight {
-            pending: pending.filter(|(_, left)| *left > 0).collect(),
-            busy: busy.filter(|(_, left)| *left > 0).collect(),
-        }
-    }
-}
 
 /// State of a path at the delivery of a bundle.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -176,7 +153,7 @@ pub(super) fn line(
     steps: &mut u64,
 ) -> Result<Vec<Way>, (u32, String)> {
     let machine = flow.program.machine;
-    let mut clock = Clock::resume(&state.time.pending, &state.time.busy, machine);
+    let mut clock = Clock::resume(&state.time, machine);
     let mut known = state.known.clone();
     let mut at = first;
     loop {
@@ -249,9 +226,12 @@ impl After<'_> {
         refilled.redirect(machine);
         resolved.not_taken(machine);
         let on = |end: End, clock: &Clock| {
-            let (pending, busy) = clock.in_flight();
-            let time = InFlight { pending, busy };
-            let state = State { time, known: self.known.clone(), count: None, published: self.published };
+            let state = State {
+                time: clock.in_flight(),
+                known: self.known.clone(),
+                count: None,
+                published: self.published,
+            };
             let cycles = Cost::exactly(clock.delivered());
             Way { end, state: Some(state), cycles, is_possible: true }
         };

@@ -32,8 +32,8 @@ use takt_work::Unit;
 /// Check that an image does what its source says, for every input and on every path.
 ///
 /// An independent checker executes both symbolically, and compares every write to a port, store, flag and state, bit for bit. It
-/// shows sums that are fused with a product, and compares the cycles of sections with its own statement of the rules of issue. With --bound, it checks the proof of the bounds of a
-/// program instead.
+/// shows sums that are fused with a product, and compares the cycles of sections with its own statement of the rules of issue. With
+/// --bound, it checks the proof of a program's bounds instead.
 #[derive(Args)]
 #[command(after_help = "\
 Exit status: 0 if every image is its source, or the bounds are proved; 1 if one differs, or if that cannot be excluded.
