@@ -565,6 +565,91 @@ const CHANGES: &[(&str, Change, &str)] = &[
     ),
 ];
 
+/// A section whose `publish` is left out, as if it had come before the section began.
+#[test]
+fn a_publication_cannot_be_claimed_away() {
+    let program = assembled(
+        "early.s",
+        &MemoryLoader::of(
+            "early.s",
+            ".input x\n.output y\n.period\np: mov y, x\n publish\n nop\n wait p\n".to_owned(),
+        ),
+        &T3,
+    );
+    let program = program.expect("it assembles");
+    let (_, mut certificate) = certify(&program).expect("it has bounds");
+    let proof = &mut certificate.proofs[0];
+    for entry in &mut proof.entries {
+        let begin = proof.states[entry.state as usize].clone();
+        entry.state = proof.states.len() as u32;
+        proof.states.push(begin);
+    }
+    let begins = proof.states.len() - proof.entries.len();
+    proof.states[..begins].iter_mut().for_each(|state| state.published = true);
+    for lemma in &mut proof.lemmas {
+        let Lemma::Code { places, exits } = lemma else { continue };
+        exits.retain(|exit| !matches!(exit.end, End::Publish { .. }));
+        places.iter_mut().for_each(|place| place.edges.truncate(1));
+    }
+    certificate.sections.iter_mut().for_each(|section| section.published = None);
+    let text = serde_json::to_string(&certificate).expect("it is plain data");
+    let error = check(&program, text.as_bytes()).expect_err("it publishes").to_string();
+    assert!(error.contains("claimed wrongly whether a `publish`"), "{error}");
+}
+
+/// Iterations that are cheaper than their price: the fewest of them are the worst case of the loop, not the most.
+#[test]
+fn cheap_iterations_are_not_taken_for_granted() {
+    let mut found = 0;
+    for [a, b] in [[0, 1], [1, 0]] {
+        let nops = " nop\n".repeat(8);
+        let text = format!(
+            ".input n:int, k:int\n.output y:int\n.reg r:int q:int m:int c:int\n.period\np: li r, {a}\n iadd c, r, 1\n \
+             loop c, e\n.loop_bound 3\n nop\ne: mov q, n\n call f\n li r, {b}\n mov q, k\n call f\n mov y, m\n wait p\n\
+             f: mov m, q\n.loop_bound 8 total 10\nnext: isub m, m, 1\n bz r, short\n{nops}short: bnz m, next\n ret\n"
+        );
+        let program = assembled("cheap.s", &MemoryLoader::of("cheap.s", text), &T3).expect("it assembles");
+        let (_, text) = certified("cheap.s", &program, &bound(&program).expect("it has bounds"));
+        let certificate: Certificate = serde_json::from_str(&text).expect("it is one");
+        for at in 0..certificate.proofs[1].lemmas.len() {
+            let mut changed = certificate.clone();
+            let Lemma::Loop { steady: Some((_, ..0)), exits, .. } = &mut changed.proofs[1].lemmas[at] else {
+                continue;
+            };
+            exits[0].cycles.1 -= 1;
+            found += 1;
+            let text = serde_json::to_string(&changed).expect("it is plain data");
+            let error = check(&program, text.as_bytes()).expect_err("it is too little").to_string();
+            assert!(error.contains("the way to bundle"), "{error}");
+        }
+    }
+    assert!(found > 0);
+}
+
+/// A branch is taken for decided by a value that an operation has replaced.
+#[test]
+fn a_value_that_is_overwritten_decides_no_branch() {
+    let text = ".input n:int\n.reg m:int\n.preset m = 1\n.once\n iadd m, m, n\n bz m, on\n nop\non: halt\n";
+    let program =
+        assembled("value.s", &MemoryLoader::of("value.s", text.to_owned()), &T3).expect("it assembles");
+    let (_, mut certificate) = certify(&program).expect("it has bounds");
+    let (register, value) = program.constants[0];
+    let proof = &mut certificate.proofs[0];
+    let begin = State { known: vec![(register.get(), value)], ..State::default() };
+    proof.states.push(begin);
+    let number = proof.states.len() as u32 - 1;
+    proof.entries[0].state = number;
+    let Lemma::Code { places, .. } = &mut proof.lemmas[0] else { panic!("it has no loop") };
+    places[0].state = number;
+    let known = serde_json::to_string(&certificate).expect("it is plain data");
+    check(&program, known.as_bytes()).expect("the value is that at reset");
+    let Lemma::Code { places, .. } = &mut certificate.proofs[0].lemmas[0] else { panic!("it has no loop") };
+    places[0].edges[0].to = Target::None;
+    let decided = serde_json::to_string(&certificate).expect("it is plain data");
+    let error = check(&program, decided.as_bytes()).expect_err("it depends on an input").to_string();
+    assert!(error.contains("has no edge"), "{error}");
+}
+
 #[test]
 fn changed_certificates_are_refused_each_with_its_reason() {
     let mut applied = vec![0; CHANGES.len()];
