@@ -606,7 +606,7 @@ fn cheap_iterations_are_not_taken_for_granted() {
         let text = format!(
             ".input n:int, k:int\n.output y:int\n.reg r:int q:int m:int c:int\n.period\np: li r, {a}\n iadd c, r, 1\n \
              loop c, e\n.loop_bound 3\n nop\ne: mov q, n\n call f\n li r, {b}\n mov q, k\n call f\n mov y, m\n wait p\n\
-             f: mov m, q\n.loop_bound 8 total 10\nnext: isub m, m, 1\n bz r, short\n{nops}short: bnz m, next\n ret\n"
+             f: mov m, q\n{nops}{nops}.loop_bound 8 total 10\nnext: isub m, m, 1\n bz r, short\n{nops}short: bnz m, next\n ret\n"
         );
         let program = assembled("cheap.s", &MemoryLoader::of("cheap.s", text), &T3).expect("it assembles");
         let (_, text) = certified("cheap.s", &program, &bound(&program).expect("it has bounds"));

@@ -605,10 +605,11 @@ fn a_jump_to_either_end_of_a_counted_loop_is_refused() {
 fn totals_hold_for_entries_with_iterations_of_different_lengths() {
     for long in ["first", "second"] {
         let [a, b] = if long == "first" { [1, 0] } else { [0, 1] };
+        let nops = " nop\n".repeat(8);
         let text = format!(
             ".input n:int, k:int\n.output y:int\n.reg r:int q:int m:int c:int\n.once\n wait p\n.period\np: li r, {a}\n \
              iadd c, r, 1\n loop c, e\n.loop_bound 3\n nop\ne: mov q, n\n call f\n li r, {b}\n mov q, k\n call f\n \
-             mov y, m\n wait p\nf: mov m, q\n.loop_bound 8 total 10\nnext: isub m, m, 1\n bz r, short\n nop\n nop\n \
+             mov y, m\n wait p\nf: mov m, q\n{nops}{nops}.loop_bound 8 total 10\nnext: isub m, m, 1\n bz r, short\n nop\n nop\n \
              nop\n nop\n nop\n nop\n nop\n nop\nshort: bnz m, next\n ret\n"
         );
         for machine in MACHINES {
