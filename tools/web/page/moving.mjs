@@ -43,24 +43,25 @@ if (equations.length !== 4) throw new Error(`there are ${equations.length} equat
 const { high, unit } = program.parameters.find(({ name }) => name === GAIN), knob = (i) => 70 + (220 * VALUES[i]) / high;
 const curves = runs.map((run) => path(run.inputs.w)), reference = path(runs[0].inputs.w_ref);
 const parts = [
-  put("rect", { x: 0.5, y: 0.5, width: WIDTH - 1, height: HEIGHT - 1, rx: 8, fill: "#fff", stroke: "#cfd6e0" }),
+  put("rect", { x: 0.5, y: 0.5, width: WIDTH - 1, height: HEIGHT - 1, rx: 8, fill: "#fff", stroke: "#cfd6e0", class: "g" }),
   text(16, 26, "A motor's speed controller", { class: "b" }), text(WIDTH - 16, 26, "programs/examples/gains.s", { class: "d", "text-anchor": "end" }),
-  put("rect", { x: 12, y: 38, width: WIDTH - 24, height: 88, rx: 4, fill: "#f5f7fa" }),
+  put("rect", { x: 12, y: 38, width: WIDTH - 24, height: 88, rx: 4, fill: "#f5f7fa", class: "p" }),
   ...equations.map((line, i) => text(24, 58 + 19 * i, line, { class: "m" })),
   text(16, 150, `${cycles} cycles a period`, { class: "b" }), text(142, 150, `${(cycles / CLOCK).toFixed(2)} µs at ${CLOCK} MHz, known before it runs`, { class: "d" }),
-  text(16, 180, GAIN, { class: "m" }), put("rect", { x: 70, y: 173, width: 220, height: 4, rx: 2, fill: "#cfd6e0" }),
+  text(16, 180, GAIN, { class: "m" }), put("rect", { x: 70, y: 173, width: 220, height: 4, rx: 2, fill: "#cfd6e0", class: "t" }),
   put("circle", { cx: knob(0), cy: 175, r: 7, fill: "#1f5fae" }, animate("cx", steps, along(knob))),
   ...VALUES.map((value, i) => {
     const shown = along((j) => (j === i ? "visible" : "hidden"));
     return put("text", { x: 304, y: 180, class: "m", visibility: i ? "hidden" : "visible" }, `${value} ${unit}${animate("visibility", steps, shown, { calcMode: "discrete" })}`);
   }),
   text(16, 214, "w, rad/s", { class: "b" }), text(78, 214, "from a motor that is loaded after 0.1 s; dotted: w_ref", { class: "d" }),
-  ...[0, 25, 50, 75, 100].flatMap((level) => [put("path", { d: `M${LEFT} ${y(level).toFixed(1)}H${WIDTH - RIGHT}`, stroke: "#e3e8ef" }), text(LEFT - 6, (y(level) + 4).toFixed(1), String(level), { class: "d", "text-anchor": "end" })]),
+  ...[0, 25, 50, 75, 100].flatMap((level) => [put("path", { d: `M${LEFT} ${y(level).toFixed(1)}H${WIDTH - RIGHT}`, stroke: "#e3e8ef", class: "l" }), text(LEFT - 6, (y(level) + 4).toFixed(1), String(level), { class: "d", "text-anchor": "end" })]),
   ...[0, 50, 100, 150, 200].map((period) => text(x(Math.min(period, PERIODS - 1)).toFixed(1), HEIGHT - 12, period === 200 ? "0.2 s" : `${period / 1000}`, { class: "d", "text-anchor": period === 200 ? "end" : "middle" })),
   put("path", { d: reference, class: "c", stroke: "#2f6fbf", "stroke-dasharray": "2 3" }),
-  put("path", { d: curves[0], class: "c", stroke: "#2f6fbf66" }, animate("visibility", [0, MOVES, WHOLE], ["hidden", "visible", "visible"], { calcMode: "discrete" })),
+  put("path", { d: curves[0], class: "c", stroke: "#2f6fbf", "stroke-opacity": 0.4 }, animate("visibility", [0, MOVES, WHOLE], ["hidden", "visible", "visible"], { calcMode: "discrete" })),
   put("clipPath", { id: "c" }, put("rect", { x: LEFT, y: TOP - 8, width: WIDTH - LEFT - RIGHT, height: HEIGHT - TOP }, animate("width", [0, DRAWN, WHOLE], [0, WIDTH - LEFT - RIGHT, WIDTH - LEFT - RIGHT]))),
   put("path", { d: curves[0], class: "c", stroke: "#2f6fbf", "stroke-width": 2, "clip-path": "url(#c)" }, animate("d", steps, along((i) => curves[i]))),
 ];
-const style = "text{font:12px system-ui,sans-serif;fill:#1c2330}.b{font-weight:600}.d{fill:#5d687b}.m{font:12.5px ui-monospace,'DejaVu Sans Mono',monospace}.c{fill:none}";
+const style = "text{font:12px system-ui,sans-serif;fill:#1c2330}.b{font-weight:600}.d{fill:#5d687b}.m{font:12.5px ui-monospace,'DejaVu Sans Mono',monospace}.c{fill:none}"
+  + "@media (prefers-color-scheme:dark){text{fill:#dfe5ee}.d{fill:#98a3b5}.g{fill:#14181f;stroke:#39414e}.p{fill:#1a1f28}.t{fill:#39414e}.l{stroke:#2a3240}.c{stroke:#6fa8ee}}";
 writeFileSync(out, `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${HEIGHT}" width="${WIDTH}" height="${HEIGHT}"><desc>Written by \`cargo xtask web --pictures\`</desc><style>${style}</style>\n${parts.join("\n")}\n</svg>\n`);

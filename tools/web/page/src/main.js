@@ -710,7 +710,7 @@ async function run() {
   const whole = await collect((method, params) => machine.call(method, params), periods(), (part) => {
     // All cycles together contain what runs once and the waits for the tick: beside the cycles of a period they would not add up.
     const ran = part.all ? `${plural(part.done, "period")}${part.all > part.done ? ` of ${part.all.toLocaleString("en")}` : ""}` : plural(part.total, "cycle");
-    el("ran").textContent = `${ran}, ${plural(part.operations, "operation")}; flags: ${part.flags}${part.halted ? "; halted" : ""}${part.nan_writes ? `; ${plural(part.nan_writes, "NaN")} written to ports` : ""}`;
+    el("ran").textContent = `${ran}, ${plural(part.operations, "operation")}; flags: ${part.flags.replaceAll("|", ", ")}${part.halted ? "; halted" : ""}${part.nan_writes ? `; ${plural(part.nan_writes, "NaN")} written to ports` : ""}`;
     el("fault").textContent = text(part.fault);
     if (part.fault) select("plot");
   });
