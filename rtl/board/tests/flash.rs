@@ -126,6 +126,9 @@ fn expected(bytes: &[u8]) -> u32 {
     }
 }
 
+/// Contents of a flash, by name: its two images, the program that starts, and the image with which.
+type Case<'a> = (&'a str, [Option<&'a [u8]>; 2], u32, Option<Slot>);
+
 #[test]
 fn the_newest_valid_image_starts() {
     let image = |number, mark| flash::image(circuit(), number, &entries(mark));
@@ -138,7 +141,7 @@ fn the_newest_valid_image_starts() {
     let other = flash::image(circuit() ^ 1, 9, &entries(3));
     let long: Vec<u8> = [&new[..12], &[0, 1, 0, 0], &new[16..]].concat();
     let wrapped = [image(u32::MAX, 4), image(0, 5)];
-    let cases: [(&str, [Option<&[u8]>; 2], u32, Option<Slot>); 11] = [
+    let cases: [Case<'_>; 11] = [
         ("empty", [None, None], 1, None),
         ("first", [Some(&old), None], 2, Some(Slot::First)),
         ("second", [None, Some(&old)], 2, Some(Slot::Second)),
