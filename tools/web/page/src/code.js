@@ -62,7 +62,7 @@ export class Code {
     };
     this.table.replaceChildren(node("thead", {}, node("tr", {}, node("th"), ...slots.map((slot) => node("th", { textContent: slot, scope: "col" })))), node("tbody", {}, ...bundles.flatMap(row)));
     const count = bundles.reduce((sum, { operations }) => sum + operations.filter(Boolean).length, 0);
-    this.head.textContent = `${bundles.length} bundles with ${count} operations in ${slots.length === 1 ? "one slot" : `${slots.length} slots`}; each has the colour of its line. A click goes to the line.`;
+    this.head.textContent = `${bundles.length} bundles with ${count} operations in ${slots.length === 1 ? "one slot" : `${slots.length} slots`}; each has the colour of its line. ${matchMedia("(pointer: coarse)").matches ? "A tap" : "A click"} goes to the line.`;
     this.hues = new Map(keys.filter((one) => one.file === file).map(({ key, line }) => [line, hues.get(key)]));
     this.colour();
     this.light(this.line);

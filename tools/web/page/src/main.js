@@ -468,10 +468,11 @@ function showCycles(program = state.program) {
   if (run?.cycles.length) {
     const least = run.shortest, most = run.longest;
     put(least === most ? `${most.toLocaleString("en")} cycles` : `${least.toLocaleString("en")} to ${most.toLocaleString("en")} cycles`, "b");
-    put(` a period, ${short(Number((most / CLOCK).toPrecision(3)))} µs at ${CLOCK} MHz`);
+    const times = [...new Set([least, most])].map((cycles) => short(Number((cycles / CLOCK).toPrecision(3))));
+    put(` a period, ${times.join(" to ")} µs at ${CLOCK} MHz`);
   } else put(run ? `${plural(run.total, "cycle")}` : "running …", "b");
   const worst = Math.max(...periods.map((section) => section.cycles.worst));
-  if (worst > 0) put(` · proved: at most ${worst.toLocaleString("en")}, whatever the inputs`);
+  if (worst > 0) put(` · proved: at most ${worst.toLocaleString("en")}, whatever the inputs (deadlines kept)`);
   if (program.no_bound) put(` · no bound: ${program.no_bound}`);
   if (run?.missed) put(` · ${plural(run.missed, "deadline")} missed`, "em");
   if (program.parameter_error) put(` · parameters as in the source: ${program.parameter_error}`, "em");

@@ -378,6 +378,9 @@ export class Plots {
   }
 
   draw() {
+    // The page keeps its height meanwhile, or it would scroll away from under a finger on a slider.
+    this.parent.style.minHeight = `${this.parent.offsetHeight}px`;
+    requestAnimationFrame(() => (this.parent.style.minHeight = ""));
     for (const one of this.charts) one.destroy();
     this.charts = [];
     this.parent.replaceChildren();

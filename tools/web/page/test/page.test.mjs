@@ -75,7 +75,7 @@ const limit = { timeout: 2 * PATIENCE };
 test("the integrator assembles and runs when the page opens, coloured by the language server", limit, async () => {
   const { page, errors } = await open();
   await done(page);
-  assert.match(await cycles(page), /pi\.s on t3: 38 cycles a period, 0\.304 µs at 125 MHz · proved: at most 43, whatever the inputs$/);
+  assert.match(await cycles(page), /pi\.s on t3: 38 cycles a period, 0\.304 µs at 125 MHz · proved: at most 43, whatever the inputs \(deadlines kept\)$/);
   assert.match(await page.textContent("#more-text"), /^measured in 400 periods · no schedule takes fewer than 38 cycles · period takes 38 to 43 whatever the inputs, 44 after a missed deadline · before the first period 9$/);
   await page.click("#more summary");
   assert.ok((await page.locator("#more summary").boundingBox()).width < 80, "a button, not a bar");
