@@ -159,7 +159,7 @@ pub enum Step {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Edge {
-    /// Where the edge leads.
+    /// Place or exit at the edge's end.
     pub to: Target,
     /// Cycles from the place on.
     pub cycles: Cost,

@@ -460,7 +460,10 @@ impl<'l> Expander<'l> {
                 if text != "total" {
                     let message = format!("`{text}` is not part of a `.loop_bound`");
                     let error = Diagnostic::error("loop", name.span, message)
-                        .did_you_mean(takt_diagnostics::nearest(&text, ["total"]))
+                        .did_you_mean(takt_diagnostics::nearest(
+                            &text,
+                            Directive::LoopBound.options().iter().copied(),
+                        ))
                         .note("`total m`, the most in one section, may follow the iterations");
                     return Err(self.context.report(at.scope, error));
                 }

@@ -741,7 +741,7 @@ fn counted_loops_that_are_entered_or_left_elsewhere_are_refused() {
             assembled("loop.s", &MemoryLoader::of("loop.s", text.clone()), &T3).expect("it assembles");
         let found = bound(&program).is_ok();
         assert_eq!(found, wanted.is_empty(), "{text}");
-        // Whatever a certificate of the program claims.
+        // The program is refused for every certificate: here for one without a proof.
         let (_, mut empty) = certify(&whole(&T3)).expect("it has bounds");
         empty.program = takt_isa::certificate::fingerprint(&program);
         empty.proofs.clear();

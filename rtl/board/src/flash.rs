@@ -35,7 +35,7 @@ const SUM: usize = 4;
 const PART: usize = 32;
 /// Bytes that one command reads.
 const READ: usize = 64;
-/// Limit on the polls for the end of an erasure: seconds on the fastest line.
+/// Limit on the polls for the end of a command, and of an erasure: seconds on the fastest line.
 const POLLS: u32 = 20_000;
 /// Highest frequency of the flash's clock in MHz, which every flash takes for all commands that are used.
 const MOST_CLOCK: f64 = 20.0;
@@ -56,7 +56,7 @@ impl Flash {
         self.pins[1] == MCLK
     }
 
-    /// Why images with this room for records do not lie beside each other, in words.
+    /// Message about images that overlap or end beyond the flash, with this room for records; `None` if they fit.
     pub(crate) fn overlap(&self, records: usize) -> Option<String> {
         let ([first, second], bytes) = (self.slots, slot_bytes(records));
         if first.abs_diff(second) < bytes {
@@ -374,7 +374,10 @@ impl<L: Line> Commands for Host<L> {
         let to = address("flash") - words.len() as u16;
         words.push(go);
         self.write(to, &words)?;
-        while self.register("flash")? & 1 != 0 {}
+        let ends = (0..POLLS)
+            .map(|_| self.register("flash"))
+            .find(|state| !matches!(state, Ok(state) if state & 1 != 0));
+        ends.unwrap_or(Err(LinkError::Flash))?;
         let words = self.read(protocol::FLASH, receive.div_ceil(4))?;
         Ok(words.iter().flat_map(|word| word.to_le_bytes()).take(receive).collect())
     }

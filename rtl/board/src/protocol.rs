@@ -488,6 +488,9 @@ pub enum LinkError {
         "the program does not wait for its tick, so its values cannot be read or set between periods; `takt live PORT stop` stops it"
     )]
     Busy,
+    /// A command to the flash does not end.
+    #[error("the board's last command to its flash does not end")]
+    Flash,
     /// No period ends any more.
     #[error(
         "no period has ended for a while: the program has stopped, or is held; `takt live PORT status` says which"

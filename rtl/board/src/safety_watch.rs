@@ -13,6 +13,16 @@ use std::fmt::Write as _;
 /// Words of a moment, as the driver sends it: the cycle of the run, the core, then the words of [`Watch::header`] without `drive`.
 pub(crate) const WORDS: usize = 10;
 
+/// Net around the cores, as a member of Verilator's top.
+pub(crate) fn net(name: &str) -> String {
+    format!("rootp->{TOP}__DOT__around__DOT__{name}")
+}
+
+/// Line of Verilator's configuration that keeps a net.
+pub(crate) fn kept(module: &str, net: &str) -> String {
+    format!("public_flat_rd -module \"{module}\" -var \"{net}\"\n")
+}
+
 /// The cores that are watched.
 #[derive(Debug)]
 pub(crate) struct Watch {
@@ -78,13 +88,13 @@ impl Watch {
 
     /// Verilator's configuration, which keeps the nets.
     pub(crate) fn configuration(&self) -> String {
-        let keep = |(module, net)| format!("public_flat_rd -module \"{module}\" -var \"{net}\"\n");
-        format!("`verilator_config\n{}", self.nets().into_iter().map(keep).collect::<String>())
+        let kept = self.nets().into_iter().map(|(module, net)| kept(module, &net));
+        format!("`verilator_config\n{}", kept.collect::<String>())
     }
 
     /// C++ header with the driver's access to the nets: for each core, `drive` and the words of a moment; the tick; the registers.
     pub(crate) fn header(&self) -> String {
-        let net = |name: &str| format!("top->rootp->{TOP}__DOT__around__DOT__{name}");
+        let net = |name: &str| format!("top->{}", net(name));
         let mut text = format!(
             "#define CORES {}\nstatic void look(Vtop *top, unsigned core, uint32_t *words) {{\n    switch (core) {{\n",
             self.cores.len()

@@ -472,7 +472,7 @@ fn build(
         };
         let level = match at {
             Some(at) => format!("(*{list}[{at}])"),
-            None => format!("(top.rootp->{TOP}__DOT__around__DOT__{name})"),
+            None => format!("(top.{})", safety_watch::net(&name)),
         };
         let _ = writeln!(header, "#define FLASH_{} {level}", own.to_uppercase());
     }
@@ -481,7 +481,7 @@ fn build(
     let flash_clock =
         board.family.flash_clock.filter(|_| wiring.flash.as_ref().is_some_and(Flash::is_configuration));
     if flash_clock.is_some() {
-        let _ = writeln!(kept, "public_flat_rd -module \"{AROUND}\" -var \"flash_clock\"");
+        kept += &safety_watch::kept(AROUND, "flash_clock");
     }
     let oscillator = simulated_oscillator(board, wiring);
     let verilog = verilog.into_iter().map(|file| match &oscillator {

@@ -796,4 +796,13 @@ fn a_stored_program_starts_at_power_up() {
         "{}",
         refused.stderr
     );
+    // A source would be overwritten, and a folder is no file.
+    for (file, message) in [("first.s", "first.s"), (".", "cannot use .")] {
+        let line = format!(
+            "board sim --board ulx3s-85f --program first.s --machine t1 --wiring wiring.toml --flash {file}"
+        );
+        let refused = folder.line(&line);
+        assert_ne!(refused.status, Some(0), "{refused:?}");
+        assert!(refused.stderr.contains(message), "{refused:?}");
+    }
 }

@@ -128,3 +128,15 @@ fn emacs_colours_words_without_a_server() {
     let wanted: Vec<&str> = COLOURS.iter().map(|colour| colour.3).collect();
     assert!(found.starts_with(&wanted.join(",")), "{found}");
 }
+
+/// The options that editors colour stand in the operands that messages show.
+#[test]
+fn options_are_among_the_operands() {
+    for directive in takt_asm::Directive::ALL {
+        let operands = directive.operands();
+        let words: Vec<&str> = operands.split(|c: char| !c.is_ascii_lowercase()).collect();
+        for option in directive.options() {
+            assert!(words.contains(option), "{}: `{option}` is not in `{operands}`", directive.name());
+        }
+    }
+}

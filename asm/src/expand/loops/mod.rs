@@ -211,7 +211,10 @@ impl Expander<'_> {
                 _ => {
                     let error =
                         Diagnostic::error("loop", name.span, format!("`{text}` is not part of a `.for`"))
-                            .did_you_mean(takt_diagnostics::nearest(&text, ["step", "unroll", "max"]))
+                            .did_you_mean(takt_diagnostics::nearest(
+                                &text,
+                                Directive::For.options().iter().copied(),
+                            ))
                             .note("`step s`, `unroll n` and `max m` may follow the last value");
                     return Err(self.context.report(at.scope, error));
                 }

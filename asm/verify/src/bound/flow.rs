@@ -33,25 +33,7 @@ pub(super) struct Flow<'p> {
 /// Operation that decides where execution goes after a bundle.
 pub(super) fn redirecting(bundle: &[Operation]) -> Option<(Effect, &Operation)> {
     let effect = |operation: &Operation| operation.op.row().effect;
-    let redirects = |effect: Effect| match effect {
-        Effect::Jump
-        | Effect::BranchZero
-        | Effect::BranchNonzero
-        | Effect::Call
-        | Effect::Return
-        | Effect::Loop
-        | Effect::Publish
-        | Effect::Wait
-        | Effect::Halt => true,
-        Effect::Compute
-        | Effect::Nothing
-        | Effect::Immediate
-        | Effect::Load
-        | Effect::Store
-        | Effect::ReadFlags
-        | Effect::ClearFlags => false,
-    };
-    bundle.iter().map(|operation| (effect(operation), operation)).find(|(effect, _)| redirects(*effect))
+    bundle.iter().map(|operation| (effect(operation), operation)).find(|(effect, _)| effect.redirects())
 }
 
 impl<'p> Flow<'p> {

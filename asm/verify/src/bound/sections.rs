@@ -66,6 +66,7 @@ impl SectionSpans {
         }
     }
 }
+
 impl Checker<'_> {
     /// Checks that every section is proved in every state in which a `wait` can lead to it; returns the cycles of each.
     pub(super) fn entries(
@@ -167,6 +168,7 @@ impl Checker<'_> {
         Ok(sections)
     }
 }
+
 /// Checks that claims contain the proved cycles of every section.
 pub(super) fn claims(claims: &[Claim], proofs: &[BTreeMap<Key, SectionSpans>]) -> Result<(), Failure> {
     let mut proved: BTreeMap<Key, (Spans, Spans)> = BTreeMap::new();

@@ -104,10 +104,10 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
         let why = "--certificate is of one program: bound the program of each core";
         return Err(Failure::Usage(why.to_owned()).into());
     }
-    let bounds = application.bounds()?;
-    if let (Some(path), Application::Program(loaded)) = (&arguments.certificate, &application) {
-        certificate::write(path, &loaded.program, &bounds[0])?;
-    }
+    let bounds = match (&arguments.certificate, &application) {
+        (Some(path), Application::Program(loaded)) => vec![certificate::write(path, &loaded.program)?],
+        _ => application.bounds()?,
+    };
     let deadline = arguments.deadline.map(|deadline| deadline.cycles(arguments.clock));
     #[cfg(feature = "board")]
     if let Some(wiring) = &arguments.wiring {
@@ -252,10 +252,7 @@ fn system_json(
 
 /// Writes section bounds as a table.
 pub(crate) fn write_sections(program: &Program, bounds: &Bounds, clock: f64, out: &mut Out) -> Result<()> {
-    let text = |span: Span| match span.best == span.worst {
-        true => span.worst.to_string(),
-        false => format!("{} to {}", span.best, span.worst),
-    };
+    let text = |span: Span| number::least_to_most(span.best, span.worst);
     let refill = program.machine.refill;
     let width = bounds.sections.iter().map(|section| section.name.len()).max().unwrap_or(0);
     let columns = [left(width + 4, 0), right(12, 0), right(14, 0), left(0, 0)];

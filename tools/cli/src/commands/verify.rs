@@ -6,6 +6,7 @@ use crate::run::load::Load;
 use crate::run::workers::{self, WorkArguments, Workers};
 use crate::terminal::files::{self, Out};
 use crate::terminal::interrupt;
+use crate::terminal::number;
 use crate::terminal::options::{OptionalMachine, SourceArguments};
 use crate::terminal::output::Failure;
 use crate::terminal::progress::DelayedProgress;
@@ -231,10 +232,7 @@ fn write_bounds(result: &Result<ProvedBounds, Unproved>, out: &mut Out) -> Resul
         Ok(proved) => proved,
         Err(reason) => return Ok(writeln!(out, "not proved: {reason}")?),
     };
-    let text = |(best, worst): (u64, u64)| match best == worst {
-        true => worst.to_string(),
-        false => format!("{best} to {worst}"),
-    };
+    let text = |(best, worst)| number::least_to_most(best, worst);
     writeln!(out, "proved: these cycles hold on every path, for all inputs")?;
     for section in &proved.sections {
         let Times { refilled, in_time, missed } = section.cycles;

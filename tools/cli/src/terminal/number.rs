@@ -49,6 +49,11 @@ fn whole(text: &str, range: RangeInclusive<u64>) -> Result<u64, String> {
     }
 }
 
+/// Cycles from the least to the most: one number if they are equal.
+pub(crate) fn least_to_most(least: u64, most: u64) -> String {
+    if least == most { most.to_string() } else { format!("{least} to {most}") }
+}
+
 /// A number as text, rounded to some significant digits, without trailing zeros: plain from 0.001 to a million, else with an exponent.
 pub(crate) fn rounded(value: f64, digits: usize) -> String {
     let scientific = format!("{value:.*e}", digits.saturating_sub(1));

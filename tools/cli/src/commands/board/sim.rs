@@ -182,8 +182,12 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     reads.extend(arguments.script.as_deref().map(|path| ("--script", path)));
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
     reads.extend(arguments.plant.as_deref().map(|path| ("--plant", path)));
-    let outputs =
-        [("--outputs", &arguments.outputs), ("--record", &arguments.record), ("--plot", &arguments.plot)];
+    let outputs = [
+        ("--outputs", &arguments.outputs),
+        ("--record", &arguments.record),
+        ("--plot", &arguments.plot),
+        ("--flash", &arguments.flash),
+    ];
     let writes: Vec<OptionPath<'_>> =
         outputs.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
     files::check(&reads, &writes)?;
@@ -230,7 +234,11 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
         if wiring.flash.is_none() {
             bail!("--flash is for a wiring with the table `[flash]`");
         }
-        std::fs::create_dir_all(&folder)
+        // The simulation itself says nothing of a file that it cannot use.
+        let mut options = std::fs::OpenOptions::new();
+        let opened = options.read(true).write(true).create(true).truncate(false).open(file);
+        opened
+            .and_then(|_| std::fs::create_dir_all(&folder))
             .and_then(|()| std::os::unix::fs::symlink(std::path::absolute(file)?, folder.join(FLASH)))
             .with_context(|| format!("cannot use {}", file.display()))?;
     }

@@ -2,7 +2,7 @@
 //! Certificate of a program's bounds (`takt bound --certificate`), checked before it is written.
 
 use crate::terminal::files;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow};
 use serde::Serialize;
 use std::path::Path;
 use takt_analysis::Bounds;
@@ -10,13 +10,14 @@ use takt_isa::Program;
 use takt_isa::certificate::Certificate;
 use takt_verify::bound::check;
 
-/// Writes the certificate of a program's bounds. What the check does not confirm is not written.
-pub(super) fn write(path: &Path, program: &Program, bounds: &Bounds) -> Result<()> {
-    let (again, certificate) = takt_analysis::certify(program)?;
-    ensure!(again == *bounds, "no certificate: a second analysis found other bounds");
+/// Bounds of a program, whose certificate is written. One that the check does not confirm is not written.
+pub(super) fn write(path: &Path, program: &Program) -> Result<Bounds> {
+    let certified = takt_analysis::certify(program);
+    let (bounds, certificate) = certified.map_err(|error| anyhow!("no bound: {error}"))?;
     let text = text(&certificate)?;
     check(program, text.as_bytes()).context("no certificate: its check does not confirm the bounds")?;
-    files::write(path, text.as_bytes())
+    files::write(path, text.as_bytes())?;
+    Ok(bounds)
 }
 
 /// Certificate as JSON, with a line for each section, state, lemma and entry.
