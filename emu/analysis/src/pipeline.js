@@ -3,7 +3,7 @@
 
 const NS = "http://www.w3.org/2000/svg";
 /** Pixels of a row at least and, where few rows leave room, at most; of the axis, the least and the largest of a column, before the first. */
-const ROW = 18, TALL = 30, AXIS = 22, NARROW = 1.5, WIDE = 48, GAP = 6;
+const ROW = 18, TALL = 30, AXIS = 22, NARROW = 0.7, WIDE = 48, GAP = 6;
 /** Width of a telephone, and of a column there at least and at most until somebody zooms; elsewhere. */
 const PHONE = 480, THIN = [2, 20], USUAL = [7, 20];
 /** Pixels below the rows that are enough for the stalls. */

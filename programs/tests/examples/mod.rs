@@ -11,7 +11,7 @@ use takt_asm::loops::LoopForm;
 use takt_asm::{AssembledProgram, Contract, MemoryLoader, Options, Search};
 use takt_emu::Emulator;
 use takt_isa::{MACHINES, Machine, T3, T4, Type};
-use takt_programs::{EXAMPLES, LIBRARY};
+use takt_programs::{EXAMPLES, LIBRARY, RECORDS};
 
 /// Example with its reference and its tolerance.
 struct Case {
@@ -44,7 +44,7 @@ const CASES: &[Case] = &[
 ];
 
 fn text(name: &str) -> Option<&'static str> {
-    EXAMPLES.iter().find(|(file, _)| *file == name).map(|(_, text)| *text)
+    EXAMPLES.iter().chain(RECORDS).find(|(file, _)| *file == name).map(|(_, text)| *text)
 }
 
 /// Assembles an example; a warning is an error.
@@ -189,7 +189,7 @@ fn duties_are_published_long_before_the_wait() {
 
 #[test]
 fn every_example_is_tried() {
-    for (file, _) in EXAMPLES {
+    for (file, _) in EXAMPLES.iter().chain(RECORDS) {
         let name = file.split('.').next().expect("it has a name");
         assert!(CASES.iter().any(|case| case.name == name), "{file}");
     }

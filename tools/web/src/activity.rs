@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use takt_emu::Status;
 use takt_isa::program::{Space, Symbol};
 use takt_isa::timing::Cycle;
-use takt_isa::{Instruction, Machine, Register, SlotIndex};
+use takt_isa::{BundleAddress, Effect, Instruction, Machine, Register, SlotIndex};
 
 /// Index of a register's bank in the order of [`Machine::banks`].
 fn bank(machine: &Machine, register: Register) -> Option<usize> {
@@ -63,7 +63,8 @@ impl Playground {
         }))
     }
 
-    /// Every bundle of the program with the labels before it, and of each operation slot, unit, text and place in the source.
+    /// The addresses of what runs once, from the first to behind the last, and of the bundles that publish; every bundle of the program with
+    /// the labels before it, and of each operation slot, unit, text and place in the source.
     pub(crate) fn bundles(&self) -> Result<Value, String> {
         let program = &self.loaded()?.assembled.program;
         let bundle = |address| {
@@ -83,8 +84,14 @@ impl Playground {
             })
         };
         let slots = program.machine.slots.iter().map(|slot| slot.name);
+        let once = program.sections.iter().find(|section| section.name == "once");
+        let publishes = |address: &BundleAddress| {
+            let bundle = program.bundle(*address).and_then(Result::ok).unwrap_or_default();
+            bundle.iter().any(|one| one.op.row().effect == Effect::Publish)
+        };
         Ok(json!({
-            "slots": slots.collect::<Vec<_>>(), "bundles": program.addresses().map(bundle).collect::<Vec<_>>(),
+            "slots": slots.collect::<Vec<_>>(), "once": once.map(|section| [section.start, section.end]),
+            "published": program.addresses().filter(publishes).collect::<Vec<_>>(), "bundles": program.addresses().map(bundle).collect::<Vec<_>>(),
         }))
     }
 }

@@ -78,11 +78,11 @@ const KNOWN: [KnownExample; 12] = [
     KnownExample { name: "kalman.s", group: "Signals", short: "Kalman filter",
         text: "For those who estimate a speed from positions. Try P0 at 0, and the filter takes longer to find it.", ..PLAIN },
     KnownExample { name: "table.s", group: "Signals", short: "thermistor, table",
-        text: "For those who read a sensor that is not linear. Try B at 3000, and a volt is more degrees.", ..PLAIN },
+        text: "For those who read a sensor that is not linear. Try B at 3000, and the same voltage is further from 25 °C.", ..PLAIN },
     KnownExample { name: "blink.s", group: "First steps, and mathematics", short: "blinking lamp",
         text: "For a first look. Try SECONDS at 0.1, and the lamp blinks five times as fast.", periods: Some(2000), ..PLAIN },
     KnownExample { name: "lu.s", group: "First steps, and mathematics", short: "linear equations",
-        text: "For those who solve equations in each period. Try the tab Pipeline: one straight line, whatever the matrix.", solves: Some(Solves { matrix: "A", solution: "x", right: "b", singular: "singular" }), ..PLAIN },
+        text: "For those who solve equations in each period. Try the tab Pipeline: one staircase, whatever the matrix.", solves: Some(Solves { matrix: "A", solution: "x", right: "b", singular: "singular" }), ..PLAIN },
 ];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";

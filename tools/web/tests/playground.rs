@@ -463,7 +463,11 @@ fn constants_of_the_text_can_be_set() {
     };
     assert_eq!(of(&told), ["TF", "K", "w"], "neither the sampling period nor a count");
     let [filter, gain, speed] = [0, 1, 2].map(|at| told["settable"][at].clone());
-    assert_eq!((&filter["value"], &filter["unit"]), (&json!(1e-3), &json!("s")));
+    assert_eq!(
+        (&filter["value"], &filter["unit"], &filter["low"]),
+        (&json!(1e-3), &json!("s"), &json!(1e-4))
+    );
+    assert_eq!((&gain["low"], &speed["low"]), (&Value::Null, &Value::Null));
     assert_eq!((&gain["integer"], &gain["text"]), (&json!(true), &json!("V/rad, gain")));
     assert!(speed["value"].as_f64().is_some_and(|value| (value - 314.159).abs() < 0.001), "{speed}");
     // Places are in UTF-16 units.
@@ -475,6 +479,34 @@ fn constants_of_the_text_can_be_set() {
     assert_eq!((text(&filter), text(&speed)), ("1e-3".to_owned(), "2*pi*50".to_owned()));
     let told = assemble(&mut playground, source, "");
     assert!(!of(&told).contains(&"own".to_owned()), "its pi is the program's: {:?}", of(&told));
+}
+
+/// A slider begins at zero, or, of a divisor or a time, at a tenth of the value. There, every example still assembles, except where a voltage
+/// divider would have less voltage than its sensor gives.
+#[test]
+fn examples_assemble_at_the_least_value_of_each_slider() {
+    let mut playground = Playground::default();
+    let about = call(&mut playground, "about", Value::Null);
+    let mut refused = Vec::new();
+    for example in about["examples"].as_array().expect("a list") {
+        let source = example["source"].as_str().expect("a text");
+        let wanted = |source: &str| json!({ "name": example["name"], "source": source, "machine": "t3", "inputs": "", "plant": example["plant"] });
+        let told = call(&mut playground, "assemble", wanted(source));
+        let units: Vec<u16> = source.encode_utf16().collect();
+        for one in told["settable"].as_array().expect("a list") {
+            let place =
+                |key: &str| one[key].as_u64().and_then(|at| usize::try_from(at).ok()).expect("a place");
+            let (value, low) = (one["value"].as_f64().expect("a number"), one["low"].as_f64());
+            let least = low.unwrap_or(if value > 0.0 { 0.0 } else { 2.0 * value });
+            let [before, after] = [&units[..place("from")], &units[place("to")..]]
+                .map(|part| String::from_utf16(part).expect("whole characters"));
+            let told = call(&mut playground, "assemble", wanted(&format!("{before}{least:?}{after}")));
+            if told["assembled"] != true {
+                refused.push(format!("{} {}", example["name"], one["name"]));
+            }
+        }
+    }
+    assert_eq!(refused, ["\"table.s\" \"UREF\""]);
 }
 
 /// The loops of the examples have the bits of `takt run --plant` (`tools/cli/tests/plant.rs` compares with the same files).

@@ -93,6 +93,11 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
     })?;
     if !arguments.no_playground {
         copy(&root().join(web::PAGE), &site.join("playground"))?;
+        // Beside the book, its name leads there.
+        let page = site.join("playground/index.html");
+        let text = std::fs::read_to_string(&page)?;
+        let home = r#"<a id="home" href="../index.html" title="Takt, and its documents">"#;
+        std::fs::write(page, text.replace(r#"<a id="home">"#, home))?;
     }
     if !arguments.no_rustdoc {
         // Document the libraries only; packages for work on the project itself have no external users.

@@ -8,7 +8,7 @@ use clap::Args;
 use std::fmt::Write;
 use std::path::Path;
 use takt_automation::command::root;
-use takt_programs::{EXAMPLES, title};
+use takt_programs::{EXAMPLES, RECORDS, title};
 
 /// What is done beyond writing the folder.
 #[derive(Args)]
@@ -43,7 +43,7 @@ pub(crate) fn pages(arguments: &Arguments) -> Result<()> {
 fn examples(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     let mut list = String::new();
-    for (name, text) in EXAMPLES {
+    for (name, text) in EXAMPLES.iter().chain(RECORDS) {
         // Browsers display this extension, and offer others as downloads.
         std::fs::write(folder.join(format!("{name}.txt")), text)?;
         if !name.ends_with(".s") {

@@ -482,7 +482,7 @@ impl Search<'_> {
         let columns = Columns::new(&columns, out.page());
         writeln!(
             out,
-            "{} of {} rows that were tried, on {}",
+            "{} of {} rows tried, on {}: no other is faster and not larger",
             front.len(),
             self.tried,
             self.names().join(" + ")

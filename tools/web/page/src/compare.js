@@ -90,11 +90,6 @@ export class Comparison {
     parent.replaceChildren(this.total, node("div", { className: "tp" }, this.legend), node("div", { className: "compare-sides" }, ...this.sides.map(({ element }) => element)), head, node("div", { className: "compare-scroll" }, this.table));
   }
 
-  /** Says that the other side is still to come, with the seconds since then. */
-  waits(text) {
-    this.total.replaceChildren(text, node("span", { className: "seconds" }), " …");
-  }
-
   /** Shows two sides: `title`, `name` and `source` of the text, `picture`. */
   show(before, after) {
     Object.assign(this, { before, after });
@@ -109,7 +104,9 @@ export class Comparison {
     const named = (entry) => entry.textContent.replace(/ (\d+|\([^)]*\))$/, "");
     const entries = new Map(this.pipelines.flatMap(({ legend }) => [...legend.children].map((entry) => [named(entry), entry])));
     this.legend.replaceChildren(...[...entries].map(([name, entry]) => node("span", {}, entry.querySelector("i").cloneNode(), name)));
-    // One scale for both, at which the longer is in sight: equal lengths are equal times.
+    // One scale for both, at which the longer is in sight: equal lengths are equal times. Names of one width, so that both begin below one another.
+    const longest = Math.max(...this.pipelines.map((one) => one.longest));
+    for (const one of this.pipelines) one.longest = longest;
     for (const one of this.pipelines) one.fit();
     const width = Math.min(...this.pipelines.map((one) => one.width || Infinity));
     for (const one of this.pipelines) Object.assign(one, { width, fits: "" }).resize();

@@ -165,6 +165,6 @@ export class MachinePicture {
       forwarded.length ? `forwarded in the cycle of issue: ${forwarded.join(", ")}` : "",
     ].filter(Boolean).join("; ") + ".";
     const key = (className, text) => node("span", {}, node("i", { className }), text);
-    this.legend.replaceChildren(key("mp-key-read", "operand from a bank"), key("mp-key-forward", "forwarded: the result of this very cycle"), key("mp-key-full", "operation in flight"));
+    this.legend.replaceChildren(key("mp-key-read", "operand from a bank"), key("mp-key-forward", "operand forwarded: the result of this very cycle"), key("mp-key-return", "result on its way to its bank"), key("mp-key-full", "operation in flight, in the colour of its unit"));
   }
 }

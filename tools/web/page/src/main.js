@@ -2,7 +2,6 @@ import { Pipeline } from "../../../../emu/analysis/src/pipeline.js";
 import "../../../../emu/analysis/src/pipeline.css";
 import { PERIODS, WHICH, collect, shipped } from "./collect.js";
 import { Documents } from "./documents.js";
-import { Drive } from "./drive.js";
 import { Editor, reader } from "./editor.js";
 import { LINK_CHARACTERS, pack, unpack } from "./link.js";
 import { Plots } from "./plot.js";
@@ -22,9 +21,9 @@ const LATE = 400;
 const CLOCK = 125;
 
 const state = { works: 0, opens: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null, took: 0, document: null };
-let machine, editor, plots, pipeline, drive, documents, tuning, parameters, plant, module;
+let machine, editor, plots, pipeline, documents, tuning, parameters, plant, module;
 /** Panels that are loaded when they are asked for, and the worker of the program that the comparison is with. */
-let code, picture, comparison, other;
+let code, picture, comparison, drive, other;
 
 /** Shows an error; with `act` (text and action of a button), a notice without alarm. */
 function notice(message, act) {
@@ -78,7 +77,7 @@ function select(name, focus) {
   if (name === "plot") plots.draw();
   if (name === "step") light();
   if (name === "robot") {
-    drive.draw();
+    drive?.draw();
     driveFirst();
   }
   if (name === "pipeline") pipelineInStep();
@@ -147,6 +146,12 @@ async function light() {
   }
 }
 
+/** Loads the panel of the robot. */
+async function loadDrive() {
+  const { Drive } = await import("./drive.js");
+  drive ??= new Drive({ machine, work, current });
+}
+
 /** Offers the tab of the robot if the program can drive it. */
 function offerRobot(on) {
   el("tab-robot").hidden = !on;
@@ -155,7 +160,7 @@ function offerRobot(on) {
 
 /** Drives the robot if its panel is visible, nothing has been driven yet, and the program can drive it. */
 function driveFirst() {
-  if (state.tab === "robot" && !state.opening && !state.stale && state.program?.tracks && !state.program.inputs_error && drive.idle) drive.drive();
+  if (state.tab === "robot" && !state.opening && !state.stale && state.program?.tracks && !state.program.inputs_error && drive?.idle) drive.drive();
 }
 
 for (const tab of tabs) {
@@ -225,7 +230,7 @@ function follow() {
 /** Recomputes invalid results. */
 function again() {
   if (!state.stale || state.took > SOON) return;
-  if (machine.busy && !drive.driving) state.soon = setTimeout(again, PAUSE);
+  if (machine.busy && !drive?.driving) state.soon = setTimeout(again, PAUSE);
   else {
     if (machine.busy) machine.stop(REPLACED);
     assemble();
@@ -259,8 +264,15 @@ async function closeDocument(one) {
 
 /** Opens a stored document; the previous one remains stored. */
 async function openDocument(one) {
+  const opens = ++state.opens;
   keep();
   one = documents.get(one.id) ?? one;
+  if (exampleOf(one.name, one.source)?.track) {
+    await loadDrive();
+    // Another document may have been opened, or this one's predecessor changed, meanwhile.
+    if (opens !== state.opens) return;
+    keep();
+  }
   state.document = one;
   documents.use(one);
   showDocuments();
@@ -292,8 +304,11 @@ function useMachine() {
   return assemble();
 }
 
+/** The example whose text it is, if it is one. */
+const exampleOf = (name, source) => state.about.examples.find((one) => one.name === name && one.source === source);
+
 async function open({ name, source, inputs, periods, plant, parameters, changes, machine: wanted }) {
-  state.opens++;
+  const example = exampleOf(name, source);
   if (machine.busy) machine.stop(REPLACED);
   clearTimeout(state.soon);
   state.opening = true;
@@ -309,7 +324,6 @@ async function open({ name, source, inputs, periods, plant, parameters, changes,
   editor.stops = [];
   document.body.classList.toggle("steps", ["step", "code"].includes(state.tab));
   // The menu says which example is open, and offers it again.
-  const example = state.about.examples.find((one) => one.name === state.name && one.source === source);
   el("example").options[0].textContent = example ? `${example.name}: ${example.short}` : "open one …";
   el("try").textContent = example?.text ?? "";
   showHint();
@@ -373,7 +387,7 @@ function empty() {
   state.shown = state.program = state.run = state.drawn = state.coded = null;
   state.ahead = false;
   document.body.classList.remove("stale");
-  drive.clear();
+  drive?.clear();
   tuning.clear();
   parameters.clear();
   plant.clear();
@@ -411,9 +425,14 @@ function seconds() {
 /** Keeps the time of a result that took long. */
 function took(milliseconds) {
   state.took = milliseconds;
+  remember(timed(), milliseconds);
+}
+
+/** Keeps how long assembling a program on a machine took, if that was long. */
+function remember(key, milliseconds) {
   if (milliseconds < SOON) return;
   try {
-    localStorage.setItem(TOOK, JSON.stringify({ ...times(), [timed()]: milliseconds / 1000 }));
+    localStorage.setItem(TOOK, JSON.stringify({ ...times(), [key]: milliseconds / 1000 }));
   } catch {
     // The browser has no storage.
   }
@@ -466,13 +485,18 @@ function showCycles(program = state.program) {
   const once = program.bounds?.find((section) => section.once);
   put(`${program.name} on ${program.machine}: `);
   if (run?.cycles.length) {
-    const least = run.shortest, most = run.longest;
-    put(least === most ? `${most.toLocaleString("en")} cycles` : `${least.toLocaleString("en")} to ${most.toLocaleString("en")} cycles`, "b");
-    const times = [...new Set([least, most])].map((cycles) => short(Number((cycles / CLOCK).toPrecision(3))));
-    put(` a period, ${times.join(" to ")} µs at ${CLOCK} MHz`);
+    // The first period of many programs does what comes before it, too; the others are what one asks for.
+    const [first, ...rest] = run.cycles, isFirstAlone = rest.length > 0 && rest.every((one) => one === rest[0]);
+    const ends = isFirstAlone ? [rest[0]] : [...new Set([run.shortest, run.longest])];
+    const times = ends.map((cycles) => short(Number((cycles / CLOCK).toPrecision(3))));
+    put(`${ends.map((cycles) => cycles.toLocaleString("en")).join(" to ")} cycles`, "b");
+    put(` a period, ${times.join(" to ")} µs at ${CLOCK} MHz${isFirstAlone && first !== rest[0] ? ` (the first ${first.toLocaleString("en")})` : ""}`);
   } else put(run ? `${plural(run.total, "cycle")}` : "running …", "b");
   const worst = Math.max(...periods.map((section) => section.cycles.worst));
-  if (worst > 0) put(` · proved: at most ${worst.toLocaleString("en")}, whatever the inputs (deadlines kept)`);
+  if (worst > 0) {
+    put(` · proved: at most ${worst.toLocaleString("en")}`);
+    put(", whatever the inputs (deadlines kept)").className = "whatever";
+  }
   if (program.no_bound) put(` · no bound: ${program.no_bound}`);
   if (run?.missed) put(` · ${plural(run.missed, "deadline")} missed`, "em");
   if (program.parameter_error) put(` · parameters as in the source: ${program.parameter_error}`, "em");
@@ -502,6 +526,8 @@ function showProgram(program) {
   if (whole) {
     showParameters();
     showPlants();
+    const names = program.inputs.map(({ name }) => name);
+    el("table").placeholder = names.length ? `${names.join(",")}\n${names.map(() => "0").join(",")}\n${names.map((_, i) => (i ? "0" : "1")).join(",")}` : "The program has no input port.";
   }
   if (whole || state.shown === null) {
     const why = program.assembled ? wrong && `The inputs cannot be read: ${wrong}` : "The program does not assemble: see Messages.";
@@ -522,7 +548,7 @@ function showProgram(program) {
     }
   }
   // The build's drive is that of the same program.
-  drive.old = whole && !(drive.built && isDriven(asked()));
+  if (drive) drive.old = whole && !(drive.built && isDriven(asked()));
   if (whole) {
     offerRobot(program.tracks);
     if (program.tracks) drive.offer();
@@ -648,6 +674,7 @@ async function begin() {
   let over = false;
   showAhead(wanted, () => over);
   const program = known(await answer.finally(() => (counted(), said(), (over = true))), wanted);
+  if (program.tracks) await loadDrive();
   if (opens !== state.opens) throw new Stopped(REPLACED);
   if (state.ahead && program.assembled) {
     // What the build has drawn is of this program.
@@ -688,7 +715,7 @@ async function work(doing) {
 const assemble = () => work(async () => {
   const begun = performance.now();
   clearTimeout(state.soon);
-  if (drive.driving) machine.stop(REPLACED);
+  if (drive?.driving) machine.stop(REPLACED);
   el("wait").hidden = true;
   state.stale = false;
   await begin();
@@ -828,8 +855,11 @@ function showPicture(picture, period, cycles) {
   pipeline.show(picture);
   state.drawn = state.program;
   dimPipeline();
-  el("drawn").textContent = `${picture.program} on ${picture.machine}, ${period ? `period ${period}` : "what runs once"}: ${plural(cycles, "cycle")}, ${plural(picture.bundles.length, "bundle")}`;
+  state.caption = `${picture.program} on ${picture.machine}, ${period ? `period ${period}` : "what runs once"}: ${plural(cycles, "cycle")}, ${plural(picture.bundles.length, "bundle")}`;
+  showDrawn();
 }
+
+const showDrawn = () => (el("drawn").textContent = state.caption);
 
 /** Sides that the program can be compared with: other machines, the text as it was opened, and what was kept. */
 function showSides() {
@@ -842,17 +872,24 @@ function showSides() {
 /** Shows the period's pipeline beside that of the other side. */
 async function compare() {
   const side = el("against").value, period = Math.max(0, Number(el("which").value) || 0), { program } = state;
-  el("comparison").hidden = !side;
-  el("pipeline-picture").hidden = Boolean(side);
-  if (!side) return;
+  const shows = (on) => {
+    el("comparison").hidden = !on;
+    el("pipeline-picture").hidden = on;
+  };
+  if (!side) return shows(false);
   const { Comparison } = await import("./compare.js");
   comparison ??= new Comparison(el("comparison"), { reveal, goTo: (line) => editor.goTo(line, 0) });
   other ??= new Thread(module, new URL("worker.js", location.href));
   const wanted = side === "opened" ? state.opened : side === "kept" ? state.kept : { ...asked(), machine: side.slice(3) }, key = JSON.stringify([wanted, period]);
   if (comparison.key !== key) {
     if (other.busy) other.stop(REPLACED);
-    comparison.waits(`Assembling ${wanted.name} ${side === "opened" ? "as it was opened" : side === "kept" ? "as it was kept" : side}`);
-    const counted = countSeconds("#comparison .seconds", {}), assembled = await other.call("assemble", wanted).finally(counted);
+    // The picture of this side stays until the other is there.
+    shows(false);
+    const begun = performance.now(), pair = `${wanted.name} ${wanted.machine.slice(0, 20)}`, usual = times()[pair] ? { usual: Math.round(times()[pair]) } : seconds();
+    const counting = Object.assign(document.createElement("span"), { className: "seconds", ariaLive: "off", textContent: elapsed(0, usual) });
+    el("drawn").append(` · assembling ${wanted.name} ${side === "opened" ? "as it was opened" : side === "kept" ? "as it was kept" : side}`, counting, " …");
+    const counted = countSeconds("#drawn .seconds", usual), assembled = await other.call("assemble", wanted).finally(counted);
+    remember(pair, performance.now() - begun);
     if (!assembled.assembled) throw new Error(`What it is to be compared with does not assemble on this machine: ${assembled.messages[0]?.message ?? "see its text"}`);
     const { picture } = await other.call("picture", { period });
     const title = { opened: `as opened, on ${assembled.machine}`, kept: `kept, on ${assembled.machine}` }[side] ?? `on ${assembled.machine}`;
@@ -861,6 +898,8 @@ async function compare() {
   if (program !== state.program) return;
   // From what was to what is, and from this machine to another.
   const isMachine = side.startsWith("on "), own = { title: isMachine ? `on ${program.machine}` : `now, on ${program.machine}`, name: state.name, source: editor.text, picture: pipeline.data };
+  shows(true);
+  showDrawn();
   comparison.show(...(isMachine ? [own, comparison.side] : [comparison.side, own]));
 }
 
@@ -950,7 +989,7 @@ function pressed(event) {
   const name = [event.ctrlKey || event.metaKey ? "Mod" : "", event.altKey ? "Alt" : "", event.shiftKey ? "Shift" : "", event.key.length === 1 ? event.key.toLowerCase() : event.key].filter(Boolean).join("-");
   const found = KEYS.find(([key]) => key === name);
   // Other work may proceed during a drive.
-  if (!found || (el("assemble").disabled && !drive.driving)) return;
+  if (!found || (el("assemble").disabled && !drive?.driving)) return;
   event.preventDefault();
   event.stopPropagation();
   found[2]();
@@ -973,9 +1012,8 @@ async function start() {
       changed("tune");
     },
   });
-  plots = new Plots(el("charts"), el("choice"), { axis: el("axis"), length: el("length"), together: el("together") });
+  plots = new Plots(el("charts"), el("choice"), el("lead"), { axis: el("axis"), length: el("length"), together: el("together") });
   pipeline = new Pipeline(el("pipeline-picture"), reveal);
-  drive = new Drive({ machine, work, current });
   tuning = new Tuning(el("tuning"), { begins: (differs) => plots.keep(differs), sets: (texts) => editor.tune(texts), textOf: (name) => editor.valueOf(name) });
   editor = new Editor(el("source"), { thread: language, told: notice, late, diagnosed, changed, stopped: toggleStop, showFile, moved: (line) => markPipeline(line, true) });
   state.about = await machine.call("about");
@@ -1071,6 +1109,8 @@ async function start() {
     if (now && !state.dirty && now.source !== editor.text) openDocument(now);
     else showDocuments();
   });
+  // On a telephone, the first chart stays below the summary while sliders move.
+  new ResizeObserver(() => document.documentElement.style.setProperty("--summary", `${el("summary").offsetHeight}px`)).observe(el("summary"));
   // Where there is room, the machine is to be seen.
   el("machine-box").open = innerWidth >= 1100 && innerHeight >= 800;
   select("plot");

@@ -5,9 +5,11 @@ import { COLOURS, short } from "./parts.js";
 import { Pen, drawing } from "./svg.js";
 
 /** Dashes of the curves in a chart, so that many differ in more than colour, and those of a reference. */
-const DASHES = [[], [], [7, 4], [9, 3, 2, 3]], REFERENCE = [2, 3];
+const DASHES = [[], [], [14, 3], [9, 3, 2, 3]], REFERENCE = [2, 3];
 /** Maximum number of curves over one axis. */
 const TOGETHER = COLOURS.length;
+/** Ports beyond this number are offered when they are asked for. */
+const OFFERED = 16;
 /** Number of outputs that are shown initially, and most inputs that are. */
 const SHOWN = 4, FEW = 3;
 /** Time axis in ms up to this duration in s. */
@@ -264,12 +266,15 @@ const rest = ({ resting }) => ["0", ...Object.entries(resting).map(([name, value
 
 export class Plots {
   /** `mark`: parameters that change during the run (`changes`), the period from which their sliders act (`from`), and what hears of another (`picked`).
+   * @param lead where the first chart goes on a telephone, beside the sliders
    * @param tools controls: `axis` (periods, ms or s), `length` (of a period, in ms), `together` (curves over one axis: by unit, or each alone) */
-  constructor(parent, choice, tools) {
-    Object.assign(this, { parent, choice, tools, charts: [], chosen: new Map(), choices: new Map() });
+  constructor(parent, choice, lead, tools) {
+    Object.assign(this, { parent, choice, lead, tools, charts: [], chosen: new Map(), choices: new Map() });
     tools.axis.addEventListener("change", () => (this.axis = tools.axis.value));
     tools.length.addEventListener("change", () => (this.length = Number(tools.length.value) / 1e3));
     for (const one of Object.values(tools)) one.addEventListener("change", () => this.draw());
+    this.narrow = matchMedia(`(max-width: ${NARROW}px)`);
+    this.narrow.addEventListener("change", () => this.draw());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
     new ResizeObserver(() => this.size()).observe(parent.parentElement);
   }
@@ -278,7 +283,7 @@ export class Plots {
   clear(why, of) {
     this.chosen = this.choices.get(of) ?? new Map();
     this.choices.set(of, this.chosen);
-    Object.assign(this, { before: null, axis: undefined, length: undefined });
+    Object.assign(this, { before: null, axis: undefined, length: undefined, asked: false });
     this.show(null, null, why);
   }
 
@@ -295,7 +300,7 @@ export class Plots {
     this.facts = new Map(run ? [...list("out", program?.outputs), ...list("in", program?.inputs)] : []);
     const first = this.initial();
     for (const key of this.facts.keys()) this.chosen.set(key, this.chosen.get(key) ?? first.has(key));
-    this.choice.replaceChildren(...arrays(this.facts).map(([name, keys]) => {
+    const offers = arrays(this.facts).map(([name, keys]) => {
       const label = document.createElement("label"), box = document.createElement("input"), shown = keys.filter((key) => this.chosen.get(key)).length;
       box.type = "checkbox";
       box.checked = shown === keys.length;
@@ -306,8 +311,16 @@ export class Plots {
       });
       const notes = [...(keys[0].startsWith("in ") ? ["in"] : []), ...(keys.length > 1 ? [keys.length] : [])];
       label.append(box, ` ${name}${notes.length ? ` (${notes.join(", ")})` : ""}`);
-      return label;
-    }));
+      return { label, shown };
+    });
+    const rest = offers.length > OFFERED && !this.asked ? offers.filter(({ shown }) => !shown) : [];
+    const more = Object.assign(document.createElement("button"), { type: "button", textContent: `${plural(rest.length, "more port")}`, onclick: () => {
+      this.asked = true;
+      for (const { label } of rest) label.hidden = false;
+      more.remove();
+    } });
+    for (const { label } of rest) label.hidden = true;
+    this.choice.replaceChildren(...offers.map(({ label }) => label), ...(rest.length ? [more] : []));
     this.draw();
   }
 
@@ -379,11 +392,14 @@ export class Plots {
 
   draw() {
     // The page keeps its height meanwhile, or it would scroll away from under a finger on a slider.
-    this.parent.style.minHeight = `${this.parent.offsetHeight}px`;
-    requestAnimationFrame(() => (this.parent.style.minHeight = ""));
+    for (const box of [this.parent, this.lead]) {
+      box.style.minHeight = `${box.offsetHeight}px`;
+      requestAnimationFrame(() => (box.style.minHeight = ""));
+    }
     for (const one of this.charts) one.destroy();
     this.charts = [];
     this.parent.replaceChildren();
+    this.lead.replaceChildren();
     const { run, program, before, tools } = this;
     const say = (why) => {
       if (!why) return;
@@ -403,7 +419,7 @@ export class Plots {
     const { label, ...common } = this.abscissa(), open = all.filter(({ curves }) => !isFlat(curves)), last = open.at(-1);
     const height = () => this.height(open.length, all.length - open.length);
     const { from, changes, picked } = this.mark ?? { changes: [] }, moments = [...new Set([...changes.map(({ period }) => period), ...(from > 1 ? [from] : [])])].map((period) => period - 1);
-    for (const one of all) this.charts.push(chart(this.parent, { ...one, ...common, ...(one === last && { label }), height, sync: "ports", folds: true, moments, picked: picked && ((index) => picked(index + 1)) }));
+    for (const one of all) this.charts.push(chart(this.narrow.matches && one === open[0] ? this.lead : this.parent, { ...one, ...common, ...(one === last && { label }), height, sync: "ports", folds: true, moments, picked: picked && ((index) => picked(index + 1)) }));
   }
 
   /** What to say if inputs are 0 because nobody gives them. */

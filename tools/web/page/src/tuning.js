@@ -87,7 +87,10 @@ export class Tuning {
     };
     for (const end of [least, most]) {
       end.addEventListener("change", () => {
-        if (!isNumber(end.value)) end.value = short(initial(row.constant.value)[end === least ? 0 : 1]);
+        if (!isNumber(end.value)) {
+          const { value, low, high } = row.constant, [from, to] = initial(value);
+          end.value = short(end === least ? low ?? from : high ?? to);
+        }
         row.put(Number(field.value));
       });
     }

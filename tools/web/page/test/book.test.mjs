@@ -77,6 +77,7 @@ test("every listing opens in the playground by a click, and assembles there", li
   page.setDefaultTimeout(PATIENCE);
   page.on("pageerror", (error) => failed.push(error.message));
   await page.waitForSelector("body[data-ready]");
+  assert.equal(new URL(await page.locator("#home").evaluate((link) => link.href)).pathname, `${PLACE}index.html`, "beside the book, the page leads there");
   assert.equal(new URL(book.url()).pathname, `${PLACE}${listings[0].name}`, "the book stays open");
   for (const { name, hash } of listings) {
     await page.evaluate((hash) => {

@@ -922,6 +922,7 @@ test("two machines, and a text before and after a change, stand side by side wit
   await page.waitForSelector("#pipeline-picture .tp-label");
   assert.deepEqual(requests, [], "the comparison is loaded when it is asked for");
   await page.selectOption("#against", "on t1");
+  assert.ok(await page.isVisible("#pipeline-picture .tp-label") || await page.isVisible(".compare-total"), "a picture stays until the other side is there");
   await page.waitForFunction(() => /^on t3: 38 → on t1: 65 cycles in the period \(\+27, \+71\.1 %\)/.test(document.querySelector(".compare-total")?.textContent ?? ""));
   assert.ok(requests.length > 0 && requests.every((path) => path.startsWith("/parts/") || path === "/worker.js"), `${requests}`);
   assert.equal(await page.locator(".compare-pipeline .tp-scroll").count(), 2);
@@ -982,6 +983,40 @@ test("bundles have the colours of their lines, and follow the debugger", limit, 
   assert.ok((await page.locator(".cm-hue").count()) > 5);
   await page.click("#tab-plot");
   assert.equal(await page.locator(".cm-hue").count(), 0, "the text has its colours only beside the bundles");
+  assert.deepEqual(errors, []);
+});
+
+test("the code begins with the period, and says where the outputs are out", limit, async () => {
+  const { page, errors } = await open("#example=foc_early.s", { viewport: { width: 1600, height: 900 } });
+  await done(page);
+  await page.click("#tab-code");
+  const fold = page.locator(".code .fold button"), row = (text) => page.locator(".code tbody tr", { hasText: text });
+  assert.equal(await fold.textContent(), "▸ before the first period: 5 bundles");
+  assert.ok(await page.isHidden(".code tr:has(th:text-is('0'))"));
+  assert.match(await page.locator(".published").textContent(), /the outputs are out/);
+  const [before, mark] = [await row("publish").first().boundingBox(), await page.locator(".published").boundingBox()];
+  assert.ok(before.y < mark.y && mark.y - before.y < 60, "the mark stands below the operation");
+  // All slots have room.
+  assert.equal(await page.locator(".code-scroll").evaluate((box) => box.scrollWidth > box.clientWidth), false);
+  await fold.click();
+  assert.ok(await page.isVisible(".code tr:has(th:text-is('0'))"));
+  await fold.click();
+  // The cursor's line unfolds it.
+  await page.evaluate(() => takt.goTo(takt.text.split("\n").findIndex((line) => line.includes(".once")) + 2));
+  await page.waitForFunction(() => !document.querySelector(".code .on")?.closest("tbody").hidden);
+  assert.deepEqual(errors, []);
+});
+
+test("of many ports those that are not plotted are offered when they are asked for", limit, async () => {
+  const { page, errors } = await open("#example=tracking.s");
+  await done(page);
+  const more = page.locator("#choice button");
+  assert.match(await more.textContent(), /^\d+ more ports$/);
+  const [few, all] = [await page.locator("#choice label:visible").count(), await page.locator("#choice label").count()];
+  assert.ok(few < 8 && all > 30, `${few} of ${all}`);
+  await more.click();
+  assert.equal(await page.locator("#choice label:visible").count(), all);
+  assert.match(await page.locator("#cycles").textContent(), /^tracking\.s on t3: 112 cycles a period, 0\.896 µs at 125 MHz \(the first 117\)/);
   assert.deepEqual(errors, []);
 });
 
@@ -1119,7 +1154,7 @@ test("the robot and its path are there before the program is assembled", limit, 
     const example = document.getElementById("example");
     example.value = "tracking.s";
     example.dispatchEvent(new Event("change"));
-    while (!takt.drive.robot.poses.length) await new Promise((resolve) => setTimeout(resolve, 5));
+    while (!takt.drive?.robot.poses.length) await new Promise((resolve) => setTimeout(resolve, 5));
     await new Promise((resolve) => requestAnimationFrame(resolve));
     const canvas = document.getElementById("scene"), { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
     let drawn = 0;
@@ -1206,8 +1241,14 @@ test("on a telephone the picture stands above the code, and no two labels overla
   await done(page);
   const top = (selector) => page.locator(selector).first().evaluate((one) => one.getBoundingClientRect().top);
   assert.equal(await page.evaluate(() => scrollY), 0, "the page begins at its top");
-  assert.ok((await top("#charts canvas")) < 300, `the first chart begins at ${await top("#charts canvas")}`);
+  assert.ok((await top("#lead canvas")) < 300, `the first chart begins at ${await top("#lead canvas")}`);
   assert.ok((await top("#charts canvas")) < (await top(".cm-editor")));
+  // A slider is on the first screen, and the first chart stays in sight at the last one.
+  assert.ok((await top(".constant [type=range]:visible")) < 600, `the first slider is at ${await top(".constant [type=range]:visible")}`);
+  await page.locator(".constant [type=range]:visible").last().evaluate((slider) => window.scrollTo(0, slider.getBoundingClientRect().top - 380));
+  const chart = await top("#lead canvas"), summary = await page.locator("#summary").evaluate((one) => one.getBoundingClientRect().bottom);
+  assert.ok(chart >= summary && chart < summary + 60, `the chart is at ${chart}, below the summary at ${summary}`);
+  await page.evaluate(() => window.scrollTo(0, 0));
   const tabs = await page.locator("[role=tab]:visible").evaluateAll((tabs) => tabs.map((tab) => [tab.getBoundingClientRect().top, tab.getBoundingClientRect().right]));
   assert.ok(tabs.length > 5 && tabs.every(([top, right]) => top === tabs[0][0] && right <= 390), `${tabs}`);
   await shot(page, "telephone");
@@ -1219,7 +1260,7 @@ test("on a telephone the picture stands above the code, and no two labels overla
       await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
       const found = [];
       let labels = 0;
-      for (const canvas of document.querySelectorAll("#charts canvas")) {
+      for (const canvas of document.querySelectorAll(":is(#lead, #charts) canvas")) {
         const all = window.boxes.get(canvas) ?? [];
         labels += all.length;
         for (const [i, { text, box: [l, t, r, b] }] of all.entries()) {
