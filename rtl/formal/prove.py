@@ -132,7 +132,11 @@ class Session:
         record = solve.Record(folder / "cases.json", key, self.arguments.again)
         chosen = self.arguments.cases
         started = time.monotonic()
-        found = solve.prove(proof.name, self.question(folder, graph, proof), proof.parts, self.arguments.jobs, record, chosen)
+        # Words of tables and enumerated operands are no questions to a solver.
+        is_solved = not (proof.table or proof.enumerated)
+        certifier = solve.Certifier(folder, self.arguments.certify) if self.arguments.certify and is_solved else None
+        ask = self.question(folder, graph, proof)
+        found = solve.prove(proof.name, ask, proof.parts, self.arguments.jobs, record, chosen, certifier)
         if found is not None:
             number, operands = found
             cut = True
@@ -148,7 +152,12 @@ class Session:
         decided = len([number for number in range(proof.parts) if number in record.seconds])
         seconds = round(sum(record.seconds.values()))
         if not self.arguments.share:
-            remember("results", proof.name, units=proof.units, text=proof.text, cases=proof.parts, decided=decided, seconds=seconds)
+            size, checking = (round(sum(one[i] for one in record.proofs.values())) for i in range(2))
+            proofs = {"proofs": len(record.proofs), "bytes": size, "checking": checking} if is_solved else {}
+            remember("results", proof.name, units=proof.units, text=proof.text, cases=proof.parts, decided=decided, seconds=seconds, **proofs)
+        if certifier:
+            megabytes = sum(size for size, _ in record.proofs.values()) / 1e6
+            print(f"{proof.name}: {len(record.proofs)} of {proof.parts} proofs checked, {megabytes:.1f} MB", flush=True)
         time_taken = f"{seconds} s of solving, {time.monotonic() - started:.0f} s now"
         if decided == proof.parts:
             print(f"{proof.name}: {proof.text}: proved, {proof.parts} cases, {time_taken}", flush=True)
@@ -250,6 +259,7 @@ def main():
     parser.add_argument("--mutants", type=int, default=0, help="the first so many of each unit; all unless stated")
     parser.add_argument("--cases", type=cases)
     parser.add_argument("--only", help="one proof of the unit's, or timing, or mutants")
+    parser.add_argument("--certify", metavar="CHECKER", help="decide with proofs, and check each by this program's command drat")
     parser.add_argument("--share", action="store_true")
     parser.add_argument("--again", action="store_true")
     parser.add_argument("--verbose", action="store_true")

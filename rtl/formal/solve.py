@@ -3,6 +3,7 @@
 
 import json
 import os
+import subprocess
 import sys
 import time
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
@@ -35,6 +36,39 @@ def clauses(graph):
     return result
 
 
+class Certifier:
+    """Decides clauses by the program CaDiCaL, whose proof of an answer `no` a second program checks, which shares no code with it."""
+
+    # Exit codes of SAT solvers.
+    SATISFIABLE, UNSATISFIABLE = 10, 20
+
+    def __init__(self, folder, checker):
+        self.folder = folder
+        self.checker = checker
+
+    def refute(self, clauses, name):
+        """None if the clauses have a solution; otherwise seconds of solving, bytes of the proof, seconds of checking it."""
+        formula, proof = (self.folder / f"{name}.{kind}" for kind in ("cnf", "drat"))
+        top = max((abs(one) for clause in clauses for one in clause), default=0)
+        with formula.open("w") as file:
+            file.write(f"p cnf {top} {len(clauses)}\n")
+            file.writelines(" ".join(map(str, clause)) + " 0\n" for clause in clauses)
+        started = _used()
+        status = subprocess.run(["cadical", "-q", formula, proof], stdout=subprocess.DEVNULL).returncode
+        solved = _used()
+        if status == self.SATISFIABLE:
+            return None
+        if status != self.UNSATISFIABLE:
+            raise Failure(f"cadical has not decided {formula} (status {status})")
+        done = subprocess.run([self.checker, "drat", formula, proof], capture_output=True, text=True)
+        if done.returncode:
+            raise Failure(f"the proof {proof} is wrong: {done.stderr.strip()}")
+        size = proof.stat().st_size
+        formula.unlink()
+        proof.unlink()
+        return solved - started, size, _used() - solved
+
+
 class Question:
     """A graph whose output `bad` must be 0 wherever `assumed` is 1; `part` divides its inputs into cases."""
 
@@ -59,6 +93,10 @@ class Question:
         result.append(more(-1))
         return result
 
+    def refuted(self, certifier, name, extra):
+        """Like Certifier.refute, of the graph with further clauses."""
+        return certifier.refute(self.clauses + self.assumed + extra, name)
+
     def solve(self, extra):
         """None if there is no solution, or the values of the inputs, name -> 0 or 1."""
         with Solver(name=SOLVER, bootstrap_with=self.clauses + self.assumed + extra) as solver:
@@ -67,17 +105,20 @@ class Question:
             model = set(solver.get_model())
         return {name: int(literal(number) in model) for name, number in self.graph.inputs.items()}
 
+    def wrong(self, number=None):
+        """The clauses that say that the circuit differs, in a case or in any."""
+        return [*([] if number is None else self.case(number)), [literal(self.graph.outputs["bad"])]]
+
     def counterexample(self, number=None):
         """Operands of a case, or of any, for which the circuit differs; None if there are none."""
-        case = [] if number is None else self.case(number)
-        return self.solve([*case, [literal(self.graph.outputs["bad"])]])
+        return self.solve(self.wrong(number))
 
     def uncovered(self, parts):
         """Operands that belong to no case; None if there are none."""
         return self.solve(self.beyond(parts))
 
 
-_question = None
+_question = _certifier = None
 
 
 def give_way():
@@ -85,10 +126,10 @@ def give_way():
     os.nice(10)
 
 
-def _start(ask):
-    global _question
+def _start(ask, certifier):
+    global _question, _certifier
     give_way()
-    _question = ask()
+    _question, _certifier = ask(), certifier
 
 
 def _used():
@@ -97,8 +138,13 @@ def _used():
 
 
 def _work(number):
+    """Of a case its number, operands that differ, seconds of solving, and with a certifier the proof's bytes and seconds of checking."""
+    if _certifier:
+        found = _question.refuted(_certifier, number, _question.wrong(number))
+        if found is not None:
+            return number, None, found[0], found[1:]
     started = _used()
-    return number, _question.counterexample(number), _used() - started
+    return number, _question.counterexample(number), _used() - started, None
 
 
 class Record:
@@ -107,15 +153,18 @@ class Record:
     def __init__(self, path, key, again):
         self.path = path
         self.key = key
-        self.seconds = {}
+        self.seconds, self.proofs = {}, {}
         if not again and path.is_file():
             stored = json.loads(path.read_text())
             if stored.get("graph") == self.key:
-                self.seconds = {int(number): seconds for number, seconds in stored["seconds"].items()}
+                self.seconds, self.proofs = ({int(number): value for number, value in stored.get(kind, {}).items()} for kind in ("seconds", "proofs"))
 
-    def add(self, number, seconds):
+    def add(self, number, seconds, proof):
         self.seconds[number] = round(seconds, 2)
-        text = json.dumps({"graph": self.key, "seconds": self.seconds})
+        if proof:
+            size, checking = proof
+            self.proofs[number] = [size, round(checking, 2)]
+        text = json.dumps({"graph": self.key, "seconds": self.seconds, "proofs": self.proofs})
         beside = self.path.with_suffix(".new")
         beside.write_text(text)
         os.replace(beside, self.path)
@@ -126,28 +175,30 @@ def clock(seconds):
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
-def prove(name, ask, parts, jobs, record, chosen=None):
-    """Decides every case, or the chosen ones, of the question that `ask` makes. Returns (case, operands) of the first that differs, or
-    None."""
-    missed = ask().uncovered(parts)
-    if missed is not None:
-        raise Failure(f"{name}: the cases do not cover {missed}")
+def prove(name, ask, parts, jobs, record, chosen=None, certifier=None):
+    """Decides every case, or the chosen ones, of the question that `ask` makes; with a certifier each with a proof that is checked, as well
+    as that the cases are all. Returns (case, operands) of the first that differs, or None."""
+    question = ask()
+    if not certifier or question.refuted(certifier, "uncovered", question.beyond(parts)) is None:
+        missed = question.uncovered(parts)
+        if missed is not None:
+            raise Failure(f"{name}: the cases do not cover {missed}")
     cases = range(parts) if chosen is None else [number for number in chosen if number < parts]
-    left = [number for number in cases if number not in record.seconds]
+    left = [number for number in cases if number not in (record.proofs if certifier else record.seconds)]
     if len(left) < len(cases):
         print(f"{name}: {len(cases) - len(left)} of {len(cases)} cases are decided already", file=sys.stderr)
     started = shown = time.monotonic()
-    with ProcessPoolExecutor(jobs, initializer=_start, initargs=(ask,)) as pool:
+    with ProcessPoolExecutor(jobs, initializer=_start, initargs=(ask, certifier)) as pool:
         waiting = {pool.submit(_work, number) for number in left}
         done = 0
         while waiting:
             ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
             for future in ready:
-                number, operands, seconds = future.result()
+                number, operands, seconds, proof = future.result()
                 if operands is not None:
                     pool.shutdown(wait=False, cancel_futures=True)
                     return number, operands
-                record.add(number, seconds)
+                record.add(number, seconds, proof)
                 done += 1
             now = time.monotonic()
             if now - shown > 10:

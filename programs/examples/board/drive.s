@@ -14,7 +14,6 @@
 .const  L    = 1.0e-3                   ; H
 .const  KP   = 2*pi*500*L               ; V/A: 500 Hz of bandwidth
 .const  KI   = 2*pi*500*R*T
-.const  FULL = 3000.0/2048              ; a period of the carrier in steps of the duties' scale
 
 .if !macro.amperes                      ; isolated.s brings its own
 .macro  amperes i:float, steps:int      ; A from steps of a converter for 20 A, whose middle is 2048
@@ -24,10 +23,24 @@
 .const  GREATEST = 4095
 .endif
 
+.if !macro.sine_cosine                  ; small.s has a table, and another clock
+.const  FULL = 3000.0/2048              ; a period of the carrier in steps of the duties' scale
+.macro  sine_cosine sn:float, cs:float, at:int  ; of an angle in counts of an electrical turn
+.reg    theta
+        theta = itof(at)*RAD
+        sn = sin(theta)
+        cs = cos(theta)
+.endm
+.endif
+
 .input  ca:int, cb:int                  ; of the currents' converters; the third current is the rest
 .input  n:int                           ; counts of the encoder, at the time of the currents
 .input  tripped:int                     ; the register `state` of a trip
+.if !macro.wanted                       ; small.s has no host
 .input  id_ref, iq_ref                  ; A, from the host
+.range  id_ref, iq_ref = -20, 20
+.range  n = -0x80000000, 0x7fffffff
+.endif
 .output da, db, dc                      ; duties, 0 to FULL
 .output id, iq                          ; A
 .output trip:int
@@ -43,15 +56,16 @@
         mov     da, 0.5*FULL
         mov     db, 0.5*FULL
         mov     dc, 0.5*FULL
+.if macro.first
+        first
+.endif
         wait    period
 
 .period
 period:
-.reg    at:int ia ib ibe theta sn cs d q
+.reg    at:int ia ib ibe sn cs d q
         at = n & (TURN - 1)
-        theta = itof(at)*RAD
-        sn = sin(theta)
-        cs = cos(theta)
+        sine_cosine sn, cs, at
         amperes ia, ca
         amperes ib, cb
         ibe = (ia + 2*ib)*(1/sqrt(3))
@@ -60,6 +74,11 @@ period:
         id = d
         iq = q
         trip = tripped
+
+.if macro.wanted
+.reg    id_ref iq_ref
+        wanted  id_ref, iq_ref
+.endif
 
 ; ---- PI in each axis; the bridge gives a vector of length UDC/√3, and what is cut off stays out of the integrators ----------------
 .reg    ed eq ud uq
@@ -86,8 +105,6 @@ period:
 ; For `takt accuracy`: what the converters give; counts of any number of turns; as much current as the converters measure; integrators
 ; within their limit.
 .range  ca, cb = LEAST, GREATEST
-.range  n = -0x80000000, 0x7fffffff
 .range  tripped = 0, 1
-.range  id_ref, iq_ref = -20, 20
 .range  sd, sq = -MOST, MOST
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -318,10 +318,9 @@ fn the_routed_design_does_the_same() {
 /// The example for small devices.
 const STEP: &str = "../../programs/examples/board/step";
 
-/// Runs the placed and routed netlist of the example for small devices on an iCEBreaker beside its circuit: the pins are the same in each
+/// Runs the placed and routed netlist of the example for small devices on a board beside its circuit: the pins are the same in each
 /// cycle. A fault planted in the netlist must be found. With `TAKT_ROUTED=1` only, like the test above.
-#[test]
-fn the_routed_design_without_a_host_drives_the_same_pins() {
+fn routed_pins_are_those_of_the_circuit(name: &str) {
     if std::env::var_os("TAKT_ROUTED").is_none() {
         return;
     }
@@ -329,12 +328,13 @@ fn the_routed_design_without_a_host_drives_the_same_pins() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(STEP).join(name);
         std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
     };
-    let (source, row, text) = (read("servo.s"), read("machine.toml"), read("icebreaker.toml"));
-    let board = Board::from_name("icebreaker").expect("a board").expect("a right one");
-    let wiring = Wiring::read("icebreaker.toml", &text, &board).expect("a right wiring");
+    let file = format!("{name}.toml");
+    let (source, row, text) = (read("servo.s"), read("machine.toml"), read(&file));
+    let board = Board::from_name(name).expect("a board").expect("a right one");
+    let wiring = Wiring::read(&file, &text, &board).expect("a right wiring");
     let loader = MemoryLoader::new(&[("servo.s", source.as_str()), ("machine.toml", row.as_str())]);
     let servo = assemble("servo.s", &loader, &Options::default()).unwrap_or_else(|e| panic!("{e:?}")).program;
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-routed-ice40");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("board-routed-{name}"));
     let venv = tools(&board);
     let models = board.family.models.as_ref().expect("models of the cells");
     let options = build::Options { seed: 1, seeds: 1, time: None, netlist: true };
@@ -354,6 +354,16 @@ fn the_routed_design_without_a_host_drives_the_same_pins() {
     assert!(first_difference(circuit(), faulty).is_some(), "the planted fault was not noticed");
 }
 
+#[test]
+fn the_routed_design_on_an_icebreaker_drives_the_same_pins() {
+    routed_pins_are_those_of_the_circuit("icebreaker");
+}
+
+#[test]
+fn the_routed_design_on_a_tang_nano_drives_the_same_pins() {
+    routed_pins_are_those_of_the_circuit("tang-nano-9k");
+}
+
 /// The first run of a drive by step and direction in which two boards' output pins differ. The motor turns as the PWM drives it.
 fn first_difference(mut one: Simulation, mut other: Simulation) -> Option<u32> {
     let (mut position, mut drove) = (0, 0);
@@ -366,7 +376,7 @@ fn first_difference(mut one: Simulation, mut other: Simulation) -> Option<u32> {
             board.turns = vec![EncoderMotion { pins, from: position, by: moves }];
             board.set("wanted_direction", run % 200 < 120);
             board.set("wanted_step", run % 2 == 0);
-            // The button is not pressed, but for a while.
+            // The button, of a board that has one, is not pressed, but for a while.
             board.set("button", !(300..310).contains(&run));
             board.run(1200, &[]).expect("it runs");
         }

@@ -128,6 +128,37 @@ fn isolated_currents_close_the_loop_and_trip() {
     }
 }
 
+/// A servo drive on a board without a host: sixteen steps at its pins turn the motor by a sixteenth of a turn, with sines from a table.
+#[test]
+fn a_servo_without_a_host_follows_steps() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path().join("machine")).unwrap();
+    for name in ["drive.s", "small.s", "small.toml", "machine/foc.toml"] {
+        folder.write(name, text(name));
+    }
+    let file = text("plant/small.toml");
+    folder.write("motor.toml", &file);
+    let target = "--wiring small.toml --program small.s";
+    let done = sim(&folder, &format!("{target} --plant motor.toml --periods 1600 --outputs pins.csv"));
+    assert!(done.status == Some(0) && done.stderr.contains("1600 periods"), "{done:?}");
+    let pins = Table::of(&folder, "pins.csv");
+    let (count, wanted) = (pins.column("n"), pins.column("steps"));
+    assert_eq!((wanted[90], wanted[300]), (0.0, 16.0));
+    assert!(count[90].abs() <= 1.0 && (count[1599] - 1024.0).abs() < 16.0, "{} counts", count[1599]);
+    assert!(count.windows(2).all(|two| (two[1] - two[0]).abs() < 12.0), "no faster than VMAX");
+    assert!(pins.column("pmsm_switched.id").iter().all(|current| current.abs() < 0.4));
+
+    // Nobody could write what a host writes.
+    folder.write("motor.toml", file.replace("[pins]", "[inputs]\nmore = 0\n\n[pins]"));
+    let asks = text("small.s").replace(".input  steps:int", ".input  more, steps:int");
+    folder.write("small.s", asks.replace("        id = 0\n", "        id = more\n"));
+    let done = sim(&folder, &format!("{target} --plant motor.toml --periods 10"));
+    assert!(
+        done.status == Some(1) && done.stderr.contains("the host would write the port `more`"),
+        "{done:?}"
+    );
+}
+
 /// Six axes on one core at their pins: each moves as its goal says; a cable that is pulled stops its own axis; a comparator stops all without a clock.
 #[test]
 fn six_axes_at_pins_move_and_stop_alone() {

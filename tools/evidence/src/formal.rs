@@ -6,11 +6,13 @@
 //! and the faulting bundles. The properties are the rules of `docs/timing.md`, stated for one arbitrary register of each bank, and so for
 //! all. `units.rs` proves the units.
 
+mod drat;
 mod enumerate;
 pub(crate) mod results;
 mod tables;
 mod units;
 
+pub(crate) use drat::{Arguments as DratArguments, drat};
 pub(crate) use enumerate::{Arguments as EnumerateArguments, enumerate};
 pub(crate) use tables::tables;
 
@@ -63,6 +65,10 @@ pub(crate) struct Arguments {
     /// Of units: decide again what has been decided.
     #[arg(long, requires = "units")]
     again: bool,
+    /// Of units: decide with proofs (DRAT) by the program CaDiCaL, and let another program check each; what has been certified is not
+    /// repeated.
+    #[arg(long, requires = "units")]
+    certify: bool,
     /// How each planted fault was refuted.
     #[arg(long)]
     verbose: bool,
@@ -80,6 +86,7 @@ impl Arguments {
         only: None,
         cases: None,
         again: false,
+        certify: false,
         verbose: false,
     };
 }

@@ -24,12 +24,18 @@ struct RoutedBoard {
     files: &'static [&'static str],
 }
 
-const BOARDS: [RoutedBoard; 2] = [
+const BOARDS: [RoutedBoard; 3] = [
     RoutedBoard { board: "ulx3s-85f", folder: TEST, wiring: "wiring.toml", files: &["loop.s"] },
     RoutedBoard {
         board: "icebreaker",
         folder: boards::SMALL_FOLDER,
         wiring: "icebreaker.toml",
+        files: boards::SMALL_FILES,
+    },
+    RoutedBoard {
+        board: "tang-nano-9k",
+        folder: boards::SMALL_FOLDER,
+        wiring: "tang-nano-9k.toml",
         files: boards::SMALL_FILES,
     },
 ];

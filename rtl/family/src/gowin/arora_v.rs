@@ -11,6 +11,8 @@ pub static FAMILY: Family = Family {
     parts: &[Part { name: "GW5A-25", tool: "GW5A-LV25", room: room(23_040, 23_040, 28, 56) }],
     grades: (1, 2),
     multiplier: [27, 18],
+    // The multipliers are others.
+    models: None,
     oscillator: Some(Oscillator {
         cell: "OSCA",
         mhz: (1.7, 105.0),

@@ -4,11 +4,12 @@
 
 pub mod arora_v;
 pub mod little_bee;
+mod netlist;
 mod pll;
 
 use crate::{
-    Carry, Cells, Constraints, Family, MeasurementDevice, Oscillator, Pack, Part, Pinout, Place, Pll, Pull,
-    ROUTED, Sites, Synthesis, pins, room,
+    Carry, Cells, Constraints, Family, MeasurementDevice, Models, Oscillator, Pack, Part, Pinout, Place, Pll,
+    Pull, ROUTED, Sites, Synthesis, YosysFile, pins, room,
 };
 use std::fmt::Write as _;
 use takt_isa::memory::{KBIT_18, Memories, Shape};
@@ -46,7 +47,7 @@ const GW2A: Family = Family {
     synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw2a", top, netlist), files: FILES }),
     place: Some(PLACE),
     pack: Some(PACK),
-    models: None,
+    models: Some(MODELS),
     bank: None,
     board: Some(Pinout { packages: &["MG196", "PG256", "PG484", "EQ144", "QN88"], ..PINOUT }),
     flow: None,
@@ -81,6 +82,23 @@ const CELLS: Cells = Cells {
         ("MULTALU", 1),
     ],
     block_rams: &[("SDP", 1), ("DPB", 1), ("DPX9B", 1), ("SPX9", 1), ("SP", 1), ("pROM", 1)],
+};
+
+const MODELS: Models = Models {
+    cells: Some(("gowin.v", include_str!("cells.v"))),
+    library: &[YosysFile { path: "gowin/cells_sim.v", name: "cells_sim.v", mend: netlist::library }],
+    mend: netlist::mend,
+    tables: netlist::tables,
+    truth_table: netlist::truth_table,
+    mapped_table: (
+        "table.v",
+        "module LUT4 (input I0, I1, I2, I3, output F);
+    parameter [15:0] INIT = 16'd0;
+    \\$lut #(.WIDTH(4), .LUT(INIT)) table4 (.A({I3, I2, I1, I0}), .Y(F));
+endmodule
+",
+    ),
+    mapped_library: &["gowin/cells_sim.v"],
 };
 
 const PLACE: Place = Place {

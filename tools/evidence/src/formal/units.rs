@@ -4,7 +4,7 @@
 use super::Arguments;
 use anyhow::{Context, Result, bail, ensure};
 use takt_automation::check_cache::Inputs;
-use takt_automation::command::root;
+use takt_automation::command::{apt_install, root, works};
 use takt_automation::venv::{SAT, Venv, YOSYS};
 use takt_isa::{UNITS, Unit};
 
@@ -51,11 +51,18 @@ pub(super) fn prove(arguments: &Arguments, names: &[String], share: bool) -> Res
     }
     let venv = Venv::with(&[YOSYS, SAT])?;
     let mut command = venv.command("python3")?;
-    command.env("TAKT_ENUMERATOR", std::env::current_exe().context("this program's file is unknown")?);
+    let own = std::env::current_exe().context("this program's file is unknown")?;
+    command.env("TAKT_ENUMERATOR", &own);
     command.arg(root().join("rtl/formal/prove.py")).arg("--folder").arg(root().join("target/formal/units"));
     command.args(["--jobs", &arguments.jobs.to_string(), "--mutants", &arguments.mutants.to_string()]);
     command.args(share.then_some("--share")).args(arguments.again.then_some("--again"));
     command.args(arguments.verbose.then_some("--verbose"));
+    if arguments.certify {
+        if !works("cadical", "--version") {
+            apt_install(&["cadical"])?;
+        }
+        command.arg("--certify").arg(&own);
+    }
     for (option, value) in [("--only", &arguments.only), ("--cases", &arguments.cases)] {
         if let Some(value) = value {
             command.args([option, value]);

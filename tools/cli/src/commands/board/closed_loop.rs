@@ -173,6 +173,12 @@ impl<'a> PlantAtPins<'a> {
         });
         let mut references = references.collect::<Result<Vec<Reference>>>()?;
         references.sort_by_key(|reference| reference.address);
+        if let Some(reference) = references.first().filter(|_| !wiring.uart) {
+            bail!(
+                "the host would write the port `{}`, and the wiring leaves out its UART (`uart = false`): leave the port out of [inputs]",
+                reference.port.name
+            );
+        }
         Ok(PlantAtPins { wiring, interface, motion, drives, measurements, pins, references })
     }
 
@@ -616,6 +622,26 @@ impl AtPins {
         Ok(())
     }
 
+    /// Ends a run: completes the table, draws the picture, says what ran. The reason of a failure is kept before `ran`.
+    fn finish(&mut self, ran: Result<()>, run: &Run<'_>, begun: Instant) -> Result<()> {
+        let (written, cycles) = (self.rows.written, self.sim.cycles);
+        let result = self.failed.take().map_or(ran, Err);
+        let outputs = self.rows.outputs.take().filter(|_| written > 0 || result.is_ok());
+        let finished = outputs.map_or(Ok(()), Out::finish);
+        let curves = self.rows.curves.take().filter(|curves| !curves.is_empty());
+        if let Some((path, curves)) = run.plot.zip(curves) {
+            crate::terminal::files::write(path, curves.draw(&run.title)?.as_bytes())?;
+        }
+        result.and(finished)?;
+        let seconds = begun.elapsed().as_secs_f64();
+        output::message(&format!(
+            "{written} periods of `{}` at the pins: {cycles} cycles, {:.0} a second",
+            self.interface.name,
+            cycles as f64 / seconds.max(1e-9)
+        ));
+        Ok(())
+    }
+
     /// The table has all of its rows.
     fn is_over(&self) -> bool {
         self.rows.most.is_some_and(|most| self.rows.written >= most)
@@ -774,29 +800,67 @@ pub(super) fn run(
     out: &mut Out,
 ) -> Result<()> {
     let (wiring, begun) = (plant.wiring, Instant::now());
-    let name = plant.interface.name.clone();
     let mut board = AtPins::new(plant, sim, rows)?;
     // Encoders stand at their places before the reset ends.
     board.act(&Stop { cycles: 0, tick: false, edges: Vec::new() });
+    if !wiring.uart {
+        // The program starts by itself: its first tick is the plant's time 0.
+        board.is_armed = true;
+        let ran = drive_alone(&mut board, &mut run, out);
+        return board.finish(ran, &run, begun);
+    }
     // Before the program is started, whether outputs drive says nothing.
     let tell = board.sim.tell.take();
     board.sim.run(RESET, &[])?;
     let mut host = Host::connect(board, 1)?;
     let ran = drive_board(&mut host, wiring, &mut run, tell, out);
-    let AtPins { rows, failed, sim, .. } = &mut host.line;
-    let (written, cycles) = (rows.written, sim.cycles);
-    let result = failed.take().map_or(ran, Err);
-    let finished = rows.outputs.take().filter(|_| written > 0 || result.is_ok()).map_or(Ok(()), Out::finish);
-    if let (Some(path), Some(curves)) = (run.plot, rows.curves.take().filter(|curves| !curves.is_empty())) {
-        crate::terminal::files::write(path, curves.draw(&run.title)?.as_bytes())?;
-    }
-    result.and(finished)?;
-    let seconds = begun.elapsed().as_secs_f64();
-    output::message(&format!(
-        "{written} periods of `{name}` at the pins: {cycles} cycles, {:.0} a second",
-        cycles as f64 / seconds.max(1e-9)
-    ));
+    host.line.finish(ran, &run, begun)?;
     report(&mut host)
+}
+
+/// Progress of a run, by its periods or by its cycles.
+struct Progress {
+    bar: DelayedProgress,
+    periods: Option<u64>,
+    shown: u64,
+}
+
+impl Progress {
+    fn new(board: &AtPins, run: &Run<'_>) -> Progress {
+        let periods = board.rows.most;
+        let unit = if periods.is_some() { "periods" } else { "cycles" };
+        Progress { bar: DelayedProgress::new(periods.or(run.cycles), unit), periods, shown: 0 }
+    }
+
+    fn show(&mut self, board: &AtPins) {
+        let done = self.periods.map_or(board.sim.cycles, |_| board.rows.written);
+        self.bar.add(done - self.shown);
+        self.shown = done;
+    }
+}
+
+/// Cycles up to the next command of the script; `None` at the end of the run.
+fn next_slice(board: &mut AtPins, run: &mut Run<'_>, out: &mut Out) -> Result<Option<u64>> {
+    let now = board.sim.cycles;
+    if board.is_over() || run.cycles.is_some_and(|most| now >= most) {
+        return Ok(None);
+    }
+    let slice = run.cycles.map_or(SLICE, |most| SLICE.min(most - now));
+    let Some(script) = &mut run.script else { return Ok(Some(slice)) };
+    if script.act(&mut board.sim, out)? {
+        return Ok(None);
+    }
+    Ok(Some(script.at_most(now, slice as u32).into()))
+}
+
+/// Lets a board run to whose program nobody talks.
+fn drive_alone(board: &mut AtPins, run: &mut Run<'_>, out: &mut Out) -> Result<()> {
+    let mut progress = Progress::new(board, run);
+    while let Some(slice) = next_slice(board, run, out)? {
+        progress.show(board);
+        board.advance(slice, &[])?;
+    }
+    Ok(())
 }
 
 /// Starts the program, and is its host until the run ends.
@@ -829,27 +893,14 @@ fn drive_board(
     let mut steps = steps(&host.line.references, period).into_iter().peekable();
     let bit = (wiring.clock * 1e6 / f64::from(wiring.baud)).round() as u64;
     let mut asked = 0;
-    let periods = host.line.rows.most;
-    if periods.or(run.cycles).is_none() {
+    if host.line.rows.most.or(run.cycles).is_none() {
         next_commands(None, terminal.path(), wiring.baud);
     }
-    let unit = if periods.is_some() { "periods" } else { "cycles" };
-    let (bar, mut shown) = (DelayedProgress::new(periods.or(run.cycles), unit), 0);
+    let mut progress = Progress::new(&host.line, run);
     loop {
+        progress.show(&host.line);
+        let Some(mut slice) = next_slice(&mut host.line, run, out)? else { return Ok(()) };
         let now = host.line.sim.cycles;
-        let done = periods.map_or(now, |_| host.line.rows.written);
-        bar.add(done - shown);
-        shown = done;
-        if host.line.is_over() || run.cycles.is_some_and(|most| now >= most) {
-            return Ok(());
-        }
-        let mut slice = run.cycles.map_or(SLICE, |most| SLICE.min(most - now));
-        if let Some(script) = &mut run.script {
-            if script.act(&mut host.line.sim, out)? {
-                return Ok(());
-            }
-            slice = script.at_most(now, slice as u32).into();
-        }
         if let (Some((at, settings)), Some(begun)) = (steps.peek(), host.line.begun) {
             // The frame ends in the period before.
             let frame: usize = settings

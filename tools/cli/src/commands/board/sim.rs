@@ -193,14 +193,10 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     files::check(&reads, &writes)?;
     let (board, wiring, carried) = arguments.target.read(color, true)?;
     if !wiring.uart {
-        let talks = [
-            ("--plant", arguments.plant.is_some()),
-            ("--robot", arguments.robot),
-            ("--noise", arguments.noise > 0),
-        ];
+        let talks = [("--robot", arguments.robot), ("--noise", arguments.noise > 0)];
         if let Some((option, _)) = talks.into_iter().find(|(_, is_given)| *is_given) {
             bail!(
-                "{option} is for a board with a UART, which the wiring leaves out (`uart = false`); --axis, --script and --inputs drive its pins"
+                "{option} is for a board with a UART, which the wiring leaves out (`uart = false`); --axis, --plant, --script and --inputs drive its pins"
             );
         }
     }
