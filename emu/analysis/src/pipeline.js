@@ -2,8 +2,8 @@
 // Time goes across, operations go down in the order of issue. Only what is in sight is drawn, so that long traces scroll.
 
 const NS = "http://www.w3.org/2000/svg";
-/** Pixels of a row at least and, where few rows leave room, at most; of the axis, the least and the largest of a column, before the first. */
-const ROW = 18, TALL = 30, AXIS = 22, NARROW = 0.7, WIDE = 48, GAP = 6;
+/** Pixels of a row at least and, where few rows leave room, at most, with everything in sight at least, and with its name at least; of the axis, the least and the largest of a column, before the first. */
+const ROW = 18, TALL = 30, TINY = 0.3, NAMED = 11, AXIS = 22, NARROW = 0.7, WIDE = 48, GAP = 6;
 /** Width of a telephone, and of a column there at least and at most until somebody zooms; elsewhere. */
 const PHONE = 480, THIN = [2, 20], USUAL = [7, 20];
 /** Pixels below the rows that are enough for the stalls. */
@@ -361,25 +361,32 @@ export class Pipeline {
     const cycle = (this.scroll.scrollLeft + at) / this.width;
     this.width = Math.min(WIDE, Math.max(NARROW, this.width * factor));
     this.fits = "";
+    this.shared = null;
     this.resize();
     this.scroll.scrollLeft = cycle * this.width - at;
     this.paint();
   }
 
-  fit() {
+  /** Brings everything into sight; `shared`: the width of columns that another picture has, too, and whether both have names. */
+  fit(shared = null) {
     this.fits = "all";
+    this.shared = shared;
     this.resize();
   }
 
   resize() {
     const { scroll, sizer } = this;
     if (!scroll.clientWidth) return;
+    // With everything in sight, rows may be too low for their names.
+    const room = (scroll.clientHeight - AXIS - 8) / Math.max(1, this.rows.length), isAll = this.fits === "all" && room < ROW;
+    this.row = isAll ? Math.max(TINY, room) : Math.floor(Math.min(TALL, Math.max(ROW, room)));
+    const isNamed = this.row >= NAMED && (this.shared?.named ?? true);
+    this.parent.classList.toggle("tp-tiny", !isNamed);
     // As wide as the longest label asks for, but no wider than leaves the chart its room.
-    this.labelWidth = Math.round(Math.min(this.longest * 7.3 + 18, 430, 0.42 * scroll.clientWidth));
+    this.labelWidth = isNamed ? Math.round(Math.min(this.longest * 7.3 + 18, 430, 0.42 * scroll.clientWidth)) : 0;
     // Until somebody zooms, the picture follows the size: a new one fills the width, as far as its columns can be told apart and are no bars.
     const [least, most] = { new: scroll.clientWidth < PHONE ? THIN : USUAL, all: [NARROW, WIDE] }[this.fits] ?? [this.width, this.width];
-    this.width = Math.min(most, Math.max(least, (scroll.clientWidth - this.labelWidth - 4 * GAP) / Math.max(1, this.columns)));
-    this.row = Math.floor(Math.min(TALL, Math.max(ROW, (scroll.clientHeight - AXIS - 8) / Math.max(1, this.rows.length))));
+    this.width = this.shared?.width ?? Math.min(most, Math.max(least, (scroll.clientWidth - this.labelWidth - 4 * GAP) / Math.max(1, this.columns)));
     // Where the rows leave room, the stalls have it.
     if (this.fits === "new" && this.rows.length && !this.stalls.open && scroll.clientHeight - AXIS - this.rows.length * this.row > ROOM) this.stalls.open = this.opened = true;
     this.parent.style.setProperty("--row", `${this.row}px`);
@@ -455,7 +462,7 @@ export class Pipeline {
       let at = column;
       for (const stall of [...bundle.stalls].reverse()) {
         at -= stall.cycles;
-        const box = shape("rect", { class: `tp-stall tp-k-${stall.cause.replace(" ", "-")}`, x: x(at), y: top + 5, width: stall.cycles * w, height: this.row - 10 });
+        const box = shape("rect", { class: `tp-stall tp-k-${stall.cause.replace(" ", "-")}`, x: x(at), y: top + 0.28 * this.row, width: stall.cycles * w, height: Math.max(1, 0.44 * this.row) });
         box.dataset.tip = `${plural(stall.cycles, "cycle")} lost before cycle ${bundle.cycle}: ${KINDS[stall.cause] ?? stall.cause}\n${stall.text}`;
         svg.append(box);
       }
@@ -463,9 +470,9 @@ export class Pipeline {
     const group = shape("g", { class: operation ? "tp-operation" : "tp-idle", "data-row": i });
     if (operation) group.style.setProperty("--fill", this.colours.get(operation.unit));
     const latency = operation?.latency ?? 1;
-    if (latency > 1) group.append(shape("rect", { class: "tp-run", x: x(column + 1), y: top + 4, width: (latency - 1) * w, height: this.row - 8 }));
-    group.append(shape("rect", { class: "tp-issue", x: x(column), y: top + 2, width: Math.max(w, 2), height: this.row - 4, rx: 1 }));
-    if (operation?.critical) group.append(shape("rect", { class: "tp-critical", x: x(column) - 0.5, y: top + 1.5, width: Math.max(w, 2) + 1, height: this.row - 3, rx: 1.5 }));
+    if (latency > 1) group.append(shape("rect", { class: "tp-run", x: x(column + 1), y: top + 0.22 * this.row, width: (latency - 1) * w, height: Math.max(1, 0.56 * this.row) }));
+    group.append(shape("rect", { class: "tp-issue", x: x(column), y: top + 0.11 * this.row, width: Math.max(w, 2), height: Math.max(1, 0.78 * this.row), rx: 1 }));
+    if (operation?.critical) group.append(shape("rect", { class: "tp-critical", x: x(column) - 0.5, y: top + 0.08 * this.row, width: Math.max(w, 2) + 1, height: 0.84 * this.row, rx: 1.5 }));
     svg.append(group);
   }
 

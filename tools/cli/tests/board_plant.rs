@@ -144,7 +144,7 @@ fn a_servo_without_a_host_follows_steps() {
     let pins = Table::of(&folder, "pins.csv");
     let (count, wanted) = (pins.column("n"), pins.column("steps"));
     assert_eq!((wanted[90], wanted[300]), (0.0, 16.0));
-    assert!(count[90].abs() <= 1.0 && (count[1599] - 1024.0).abs() < 16.0, "{} counts", count[1599]);
+    assert!(count[90].abs() <= 1.0 && (count[1599] - 1024.0).abs() < 32.0, "{} counts", count[1599]);
     assert!(count.windows(2).all(|two| (two[1] - two[0]).abs() < 12.0), "no faster than VMAX");
     assert!(pins.column("pmsm_switched.id").iter().all(|current| current.abs() < 0.4));
 

@@ -5,6 +5,7 @@ use crate::common::protocol::Client;
 use crate::common::{Folder, source};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::process::Command;
 use takt_isa::{Function, T3, Type, Unit};
 
@@ -865,6 +866,51 @@ fn editors_leave_other_assemblers_alone() {
         helix.lines().find_map(|line| line.split_once("/path/to/takt/")).expect("the grammar's path");
     let grammar = grammar.1.trim_end_matches(&['"', ' ', '}'][..]);
     assert!(std::path::Path::new(editors).join("../..").join(grammar).is_dir(), "{grammar}");
+}
+
+/// With the shipped configuration, Neovim shows the cycles beside the lines and above the sections: before 0.10 it has no inlay hints of its
+/// own.
+#[test]
+fn neovim_shows_the_cycles() {
+    let folder = Folder::new();
+    folder.write(
+        "gains.s",
+        std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs/examples/gains.s")).unwrap(),
+    );
+    let binary = Path::new(env!("CARGO_BIN_EXE_takt")).parent().unwrap();
+    let path = format!("{}:{}", binary.display(), std::env::var("PATH").unwrap());
+    let configuration = concat!(env!("CARGO_MANIFEST_DIR"), "/../editors/neovim/takt.lua");
+    let script = r"
+        local found = {}
+        vim.wait(60000, function()
+          local space = vim.api.nvim_get_namespaces().takt
+          found.lenses = vim.tbl_map(function(one) return one.command and one.command.title end, vim.lsp.codelens.get(0))
+          found.hints = {}
+          for _, mark in ipairs(vim.api.nvim_buf_get_extmarks(0, space, 0, -1, { details = true })) do
+            table.insert(found.hints, (mark[2] + 1) .. mark[4].virt_text[1][1])
+          end
+          return #found.lenses > 0 and (#found.hints > 0 or vim.lsp.inlay_hint ~= nil)
+        end, 100)
+        vim.fn.writefile({ vim.fn.json_encode(found) }, vim.env.OUT)
+        vim.cmd('qall!')";
+    folder.write("look.lua", script);
+    let output = Command::new("nvim")
+        .args(["--headless", "--clean", "-n", "-c", "filetype on", "-c", &format!("luafile {configuration}")])
+        .args(["-c", "edit gains.s", "-c", "luafile look.lua"])
+        .current_dir(folder.path())
+        .env("PATH", path)
+        .env("OUT", folder.path().join("found.json"))
+        .env("XDG_STATE_HOME", folder.path())
+        .env("XDG_CACHE_HOME", folder.path())
+        .output()
+        .expect("nvim is there: `cargo xtask test` installs it");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    let found: Value = serde_json::from_str(&folder.read_text("found.json")).unwrap();
+    let all = |name: &str| {
+        found[name].as_array().unwrap().iter().filter_map(Value::as_str).collect::<Vec<_>>().join("; ")
+    };
+    assert!(all("lenses").contains("period: 33 cycles, lower bound 33"), "{found}\n{stderr}");
+    assert!(all("hints").is_empty() || all("hints").contains("28  6 · mul, 11 · add"), "{found}\n{stderr}");
 }
 
 /// Neovim's built-in client, from the first keystroke to the end.

@@ -464,22 +464,21 @@ fn hints(target: Target, room: u16) -> Line<'static> {
 }
 
 fn draw_help(frame: &mut Frame<'_>, target: Target, top: &mut usize, body: Rect) {
+    const INDENT: &str = "    ";
+    let room = usize::from(body.width.saturating_sub(2)).max(INDENT.len() + 1);
     let mut lines = vec![
         Line::raw(
-            "Keys that stand for commands are in brackets. `:` types a command (Tab completes, up and down go through",
-        ),
-        Line::raw(
-            "earlier ones, Esc leaves), Tab and Shift-Tab choose a pane, up, down, Page Up and Page Down scroll it,",
-        ),
-        Line::raw(
-            "Enter repeats the last step, Ctrl-C stops a command that runs. A * marks what the last command changed.",
+            "Keys that stand for commands are in brackets. `:` types a command (Tab completes, up and down go through earlier ones, Esc \
+             leaves), Tab and Shift-Tab choose a pane, up, down, Page Up and Page Down scroll it, Enter repeats the last step, Ctrl-C stops \
+             a command that runs. A * marks what the last command changed.",
         ),
         Line::default(),
     ];
     for (usage, keys, text) in commands(target) {
         let keys = if keys.is_empty() { String::new() } else { format!("  [{keys}]") };
         lines.push(Line::from(vec![Span::styled(usage, TITLE), Span::styled(keys, CHANGED)]));
-        lines.push(Line::raw(format!("    {text}")));
+        let parts = textwrap::wrap(&text, room - INDENT.len());
+        lines.extend(parts.into_iter().map(|part| Line::raw(format!("{INDENT}{part}"))));
     }
     // Without wrapping, the number of rows equals the number of lines, the minimum.
     *top = (*top).min(lines.len().saturating_sub(1));

@@ -28,6 +28,47 @@ local function colour(buffer)
   end
 end
 
+-- Cycles beside the lines, where Neovim has no inlay hints of its own (before 0.10).
+local space = vim.api.nvim_create_namespace('takt')
+local function hint(buffer)
+  if vim.lsp.inlay_hint or not vim.api.nvim_buf_is_loaded(buffer) then return end
+  local document, count = vim.uri_from_bufnr(buffer), vim.api.nvim_buf_line_count(buffer)
+  local whole = { start = { line = 0, character = 0 }, ['end'] = { line = count, character = 0 } }
+  vim.lsp.buf_request(buffer, 'textDocument/inlayHint', { textDocument = { uri = document }, range = whole }, function(_, hints)
+    if not vim.api.nvim_buf_is_loaded(buffer) then return end
+    vim.api.nvim_buf_clear_namespace(buffer, space, 0, -1)
+    local lines = {}
+    for _, one in ipairs(hints or {}) do
+      local parts = type(one.label) == 'table' and vim.tbl_map(function(part) return part.value end, one.label) or { one.label }
+      lines[one.position.line] = (lines[one.position.line] or '') .. '  ' .. table.concat(parts)
+    end
+    for line, text in pairs(lines) do
+      if line < vim.api.nvim_buf_line_count(buffer) then
+        vim.api.nvim_buf_set_extmark(buffer, space, line, 0, { virt_text = { { text, 'Comment' } } })
+      end
+    end
+  end)
+end
+
+-- Cycles of sections and blocks above their first lines, and the hints, whenever the text rests.
+local function follow(_, buffer)
+  vim.api.nvim_create_autocmd({ 'BufEnter', 'CursorHold', 'InsertLeave', 'BufWritePost' }, {
+    buffer = buffer,
+    callback = function()
+      vim.lsp.codelens.refresh()
+      hint(buffer)
+    end,
+  })
+  -- The server reads the text first, a long one for seconds.
+  for _, wait in ipairs({ 300, 1500, 5000 }) do
+    vim.defer_fn(function()
+      if not vim.api.nvim_buf_is_loaded(buffer) then return end
+      vim.api.nvim_buf_call(buffer, vim.lsp.codelens.refresh)
+      hint(buffer)
+    end, wait)
+  end
+end
+
 vim.api.nvim_create_autocmd('FileType', {
   pattern = 'takt',
   callback = function(event)
@@ -36,12 +77,12 @@ vim.api.nvim_create_autocmd('FileType', {
     local folder = vim.fn.fnamemodify(vim.api.nvim_buf_get_name(event.buf), ':p:h')
     local command = vim.list_extend({ 'takt', 'lsp' }, options)
     if vim.lsp.start then
-      vim.lsp.start({ name = 'takt', cmd = command, root_dir = folder })
+      vim.lsp.start({ name = 'takt', cmd = command, root_dir = folder, on_attach = follow })
       if vim.lsp.inlay_hint then vim.lsp.inlay_hint.enable(true, { bufnr = event.buf }) end
     else
       -- Before 0.8: one server for all buffers.
       vim.g.takt_client = vim.g.takt_client
-        or vim.lsp.start_client({ name = 'takt', cmd = command, root_dir = folder })
+        or vim.lsp.start_client({ name = 'takt', cmd = command, root_dir = folder, on_attach = follow })
       vim.lsp.buf_attach_client(event.buf, vim.g.takt_client)
     end
   end,

@@ -89,6 +89,10 @@ def legend(figure: Any, axes: Any, columns: int) -> None:
     figure.legend(lines, [line.get_label() for line in lines], loc="outside lower left", ncols=columns)
 
 
+# On a dark page the picture is negative, with its hues.
+DARK = "<style>@media (prefers-color-scheme:dark){svg:root{filter:invert(.9) hue-rotate(180deg)}}</style>"
+
+
 def save(figure: Any, file: str | Path) -> None:
     """Writes a figure as SVG."""
     import matplotlib
@@ -96,7 +100,7 @@ def save(figure: Any, file: str | Path) -> None:
     text = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": "takt"}):
         figure.savefig(text, format="svg", metadata={"Date": None})
-    Path(file).write_text(shrink(text.getvalue()))
+    Path(file).write_text(shrink(text.getvalue()).replace("<defs>", DARK + "<defs>", 1))
 
 
 if __name__ == "__main__":

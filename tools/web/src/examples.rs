@@ -60,13 +60,13 @@ const MOTOR: KnownExample = KnownExample { plant: Some("dc_motor"), periods: Som
 #[rustfmt::skip]
 const KNOWN: [KnownExample; 12] = [
     KnownExample { name: "gains.s", group: "Motors", short: "motor speed, equations",
-        text: "For makers of speed controllers. Try ki at 20, and the speed overshoots; with \"set from period\" 200, only from there on.", ..MOTOR },
+        text: "For makers of speed controllers. Try ki at 20: the speed overshoots. With \"set from period\" 200 first, only from there on.", ..MOTOR },
     KnownExample { name: "pi.s", group: "Motors", short: "motor speed, PI",
         text: "For those whose gains are fixed. Try KP at 0.3, and the speed overshoots; at 1.6, it arrives too late.", ..MOTOR },
     KnownExample { name: "foc.s", group: "Motors", short: "motor current",
         text: "For makers of motor drives. Try wc at 1500, and the currents follow more slowly.", ..CONTROL },
     KnownExample { name: "foc_early.s", group: "Motors", short: "motor current, early",
-        text: "For drives whose duties must be out early. Try the tab Code: what follows the duties is for the next period.", ..CONTROL },
+        text: "For drives whose duties must be out early. Try the tab Code: what stands below its red line, where the duties are out, is for the next period.", ..CONTROL },
     KnownExample { name: "tracking.s", group: "Robots and machines", short: "five-axis robot",
         text: "For makers of robots. Try the tab Robot, where it follows its path, and the tab Pipeline, with each cycle of a period.", seconds: Some(3), ..PLAIN },
     KnownExample { name: "pendulum.s", group: "Robots and machines", short: "pendulum on a cart",
@@ -82,7 +82,7 @@ const KNOWN: [KnownExample; 12] = [
     KnownExample { name: "blink.s", group: "First steps, and mathematics", short: "blinking lamp",
         text: "For a first look. Try SECONDS at 0.1, and the lamp blinks five times as fast.", periods: Some(2000), ..PLAIN },
     KnownExample { name: "lu.s", group: "First steps, and mathematics", short: "linear equations",
-        text: "For those who solve equations in each period. Try the tab Pipeline: one staircase, whatever the matrix.", solves: Some(Solves { matrix: "A", solution: "x", right: "b", singular: "singular" }), ..PLAIN },
+        text: "For those who solve equations in each period. Try the tab Pipeline, and Fit: one staircase, whatever the matrix.", solves: Some(Solves { matrix: "A", solution: "x", right: "b", singular: "singular" }), ..PLAIN },
 ];
 /// Program that controls the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";

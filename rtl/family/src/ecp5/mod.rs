@@ -76,26 +76,7 @@ pub static FAMILY: Family = Family {
         arguments: |_| vec!["--input", "takt.config", "--bit", "takt.bit", "--compress"],
         bitstream: "takt.bit",
     }),
-    models: Some(Models {
-        cells: Some(("ecp5.v", include_str!("cells.v"))),
-        library: &[
-            YosysFile { path: "lattice/common_sim.vh", name: "cells.v", mend: netlist::library },
-            YosysFile { path: "lattice/cells_ff.vh", name: "cells_ff.vh", mend: str::to_owned },
-            YosysFile { path: "lattice/cells_io.vh", name: "cells_io.vh", mend: str::to_owned },
-        ],
-        mend: netlist::mend,
-        tables: netlist::tables,
-        truth_table: netlist::truth_table,
-        mapped_table: (
-            "table.v",
-            "module LUT4 (input A, B, C, D, output Z);
-    parameter [15:0] INIT = 16'd0;
-    \\$lut #(.WIDTH(4), .LUT(INIT)) table4 (.A({D, C, B, A}), .Y(Z));
-endmodule
-",
-        ),
-        mapped_library: &["lattice/common_sim.vh", "lattice/ccu2c_sim.vh"],
-    }),
+    models: if cfg!(feature = "netlist") { Some(MODELS) } else { None },
     bank: Some(Proof { synthesis: "synth_lattice -family ecp5", pins: bank::pins }),
     board: Some(Pinout {
         packages: &["CABGA256", "CSFBGA285", "CABGA381", "CABGA554", "CABGA756"],
@@ -105,6 +86,27 @@ endmodule
         constraints,
     }),
     flow: None,
+};
+
+const MODELS: Models = Models {
+    cells: Some(("ecp5.v", include_str!("cells.v"))),
+    library: &[
+        YosysFile { path: "lattice/common_sim.vh", name: "cells.v", mend: netlist::library },
+        YosysFile { path: "lattice/cells_ff.vh", name: "cells_ff.vh", mend: str::to_owned },
+        YosysFile { path: "lattice/cells_io.vh", name: "cells_io.vh", mend: str::to_owned },
+    ],
+    mend: netlist::mend,
+    tables: netlist::tables,
+    truth_table: netlist::truth_table,
+    mapped_table: (
+        "table.v",
+        "module LUT4 (input A, B, C, D, output Z);
+parameter [15:0] INIT = 16'd0;
+\\$lut #(.WIDTH(4), .LUT(INIT)) table4 (.A({D, C, B, A}), .Y(Z));
+endmodule
+",
+    ),
+    mapped_library: &["lattice/common_sim.vh", "lattice/ccu2c_sim.vh"],
 };
 
 /// The LFE5U-85F of grade 8, with the pins of the ULX3S board.

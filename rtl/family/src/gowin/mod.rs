@@ -47,7 +47,7 @@ const GW2A: Family = Family {
     synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw2a", top, netlist), files: FILES }),
     place: Some(PLACE),
     pack: Some(PACK),
-    models: Some(MODELS),
+    models: if cfg!(feature = "netlist") { Some(MODELS) } else { None },
     bank: None,
     board: Some(Pinout { packages: &["MG196", "PG256", "PG484", "EQ144", "QN88"], ..PINOUT }),
     flow: None,

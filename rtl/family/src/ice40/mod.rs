@@ -73,22 +73,7 @@ pub static FAMILY: Family = Family {
         arguments: |_| vec!["takt.asc", "takt.bin"],
         bitstream: "takt.bin",
     }),
-    models: Some(Models {
-        cells: None,
-        library: &[YosysFile { path: "ice40/cells_sim.v", name: "cells_sim.v", mend: netlist::library }],
-        mend: netlist::mend,
-        tables: netlist::tables,
-        truth_table: netlist::truth_table,
-        mapped_table: (
-            "table.v",
-            "module SB_LUT4 (input I0, I1, I2, I3, output O);
-    parameter [15:0] LUT_INIT = 16'd0;
-    \\$lut #(.WIDTH(4), .LUT(LUT_INIT)) table4 (.A({I3, I2, I1, I0}), .Y(O));
-endmodule
-",
-        ),
-        mapped_library: &["ice40/cells_sim.v"],
-    }),
+    models: if cfg!(feature = "netlist") { Some(MODELS) } else { None },
     bank: None,
     board: Some(Pinout {
         packages: &["sg48", "uwg30"],
@@ -102,6 +87,23 @@ endmodule
         constraints,
     }),
     flow: None,
+};
+
+const MODELS: Models = Models {
+    cells: None,
+    library: &[YosysFile { path: "ice40/cells_sim.v", name: "cells_sim.v", mend: netlist::library }],
+    mend: netlist::mend,
+    tables: netlist::tables,
+    truth_table: netlist::truth_table,
+    mapped_table: (
+        "table.v",
+        "module SB_LUT4 (input I0, I1, I2, I3, output O);
+parameter [15:0] LUT_INIT = 16'd0;
+\\$lut #(.WIDTH(4), .LUT(LUT_INIT)) table4 (.A({I3, I2, I1, I0}), .Y(O));
+endmodule
+",
+    ),
+    mapped_library: &["ice40/cells_sim.v"],
 };
 
 /// `synth_ice40` with another script for abc, which maps for area: a board that nearly fills the device takes 2 % fewer cells.

@@ -417,8 +417,13 @@ impl ArmPlot<'_> {
 /// Sets the size in pixels of an SVG that was drawn in fine units.
 pub(crate) fn in_pixels(svg: &str, width: u32, height: u32) -> String {
     let size = |unit: u32| format!("width=\"{}\" height=\"{}\"", width * unit, height * unit);
-    svg.replacen(&size(FINE), &size(1), 1)
+    let svg = svg.replacen(&size(FINE), &size(1), 1);
+    svg.replacen(">\n", &format!(">\n{DARK}\n"), 1)
 }
+
+/// Colours on a dark page: the picture is negative, with its hues. Where a page holds the picture itself, the page's colours stay.
+const DARK: &str =
+    "<style>@media (prefers-color-scheme:dark){svg:root{filter:invert(.9) hue-rotate(180deg)}}</style>";
 
 /// Converts pixels to drawing units.
 pub(crate) fn px(pixels: u32) -> u32 {

@@ -108,8 +108,8 @@ export class Comparison {
     const longest = Math.max(...this.pipelines.map((one) => one.longest));
     for (const one of this.pipelines) one.longest = longest;
     for (const one of this.pipelines) one.fit();
-    const width = Math.min(...this.pipelines.map((one) => one.width || Infinity));
-    for (const one of this.pipelines) Object.assign(one, { width, fits: "" }).resize();
+    const width = Math.min(...this.pipelines.map((one) => one.width || Infinity)), isNamed = this.pipelines.every(({ labelWidth }) => labelWidth > 0);
+    for (const one of this.pipelines) one.fit({ width, named: isNamed });
     const [a, b] = [before.picture.cycles, after.picture.cycles];
     this.total.replaceChildren(`${before.title}: `, node("b", { textContent: a }), ` → ${after.title}: `, node("b", { textContent: b }), ` cycles in the period (${a === b ? "the same" : signed(b - a)}${a && a !== b ? `, ${signed((100 * (b - a)) / a)} %` : ""})`);
     const causes = Object.keys(KINDS).map((kind) => [kind, ...[before, after].map(({ picture }) => picture.bundles.flatMap(({ stalls }) => stalls).reduce((sum, one) => sum + (one.cause === kind && kind !== "wait" ? one.cycles : 0), 0))]);

@@ -35,7 +35,8 @@ export class Drive {
 
   /** Dims the result of an earlier program's drive. */
   set old(on) {
-    el("robot").classList.toggle("old", on && this.robot.poses.length > 0);
+    this.isOld = on && this.robot.poses.length > 0;
+    el("robot").classList.toggle("old", this.isOld);
     if (on) this.robot.play(false);
   }
 

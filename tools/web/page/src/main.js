@@ -15,8 +15,8 @@ const text = (value) => (value === null || value === undefined ? "" : String(val
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
 /** Delay from a change to the next run, which is automatic only if a run takes at most the second number; ms. */
 const PAUSE = 400, SOON = 1000;
-/** Delay after which a slider's result that is still to come dims the result before; ms. */
-const LATE = 400;
+/** Age at which a result is dimmed while a slider moves, and time of a result beyond which only that of the slider's rest is computed; ms. */
+const LATE = 1500, LONG = 3000;
 /** Clock in MHz at which times are stated, as everywhere in Takt's documents. */
 const CLOCK = 125;
 
@@ -160,7 +160,7 @@ function offerRobot(on) {
 
 /** Drives the robot if its panel is visible, nothing has been driven yet, and the program can drive it. */
 function driveFirst() {
-  if (state.tab === "robot" && !state.opening && !state.stale && state.program?.tracks && !state.program.inputs_error && drive?.idle) drive.drive();
+  if (state.tab === "robot" && !state.opening && !state.stale && state.program?.tracks && !state.program.inputs_error && (drive?.idle || drive?.isOld)) drive.drive();
 }
 
 for (const tab of tabs) {
@@ -188,9 +188,8 @@ function changed(event) {
   if (!state.document) return;
   state.stale = true;
   state.tuning = event === "tune";
-  clearTimeout(state.dims);
   const dim = () => state.stale && document.body.classList.add("stale");
-  if (state.tuning) state.dims = setTimeout(dim, LATE);
+  if (state.tuning) state.dims ??= setTimeout(dim, LATE);
   else {
     dim();
     tuning.enabled = parameters.enabled = plant.enabled = false;
@@ -214,9 +213,9 @@ function changed(event) {
   el("wait").hidden = wrong || state.took <= SOON;
 }
 
-/** Computes the results of a slider: each at once, or, if they take long, that of the slider's rest. */
+/** Computes the results of a slider: one after the other, each of the newest value, or, if they take long, that of the slider's rest. */
 function follow() {
-  if (state.took > SOON) {
+  if (state.took > LONG) {
     state.soon = setTimeout(() => (machine.busy && machine.stop(REPLACED), assemble()), PAUSE);
   } else if (!state.following) {
     state.following = true;
@@ -419,7 +418,9 @@ function seconds() {
   const took = times()[timed()];
   if (took !== undefined) return { usual: Math.round(took) };
   const isIt = (one) => one.name === state.name && one.source === editor.text && shipped(one, PERIODS).machine === el("machine").value;
-  return { idle: state.about.examples.find(isIt)?.seconds };
+  // On another machine it takes about as long.
+  const isNear = (one) => one.name === state.name && one.source === editor.text;
+  return { idle: (state.about.examples.find(isIt) ?? state.about.examples.find(isNear))?.seconds };
 }
 
 /** Keeps the time of a result that took long. */
@@ -522,6 +523,7 @@ function showProgram(program) {
   showMistake(wrong ? "The inputs cannot be read." : whole ? "" : "The text does not assemble.", el("text").textContent);
   el("wait").hidden = true;
   clearTimeout(state.dims);
+  state.dims = null;
   document.body.classList.toggle("stale", !whole && state.shown !== null);
   if (whole) {
     showParameters();
@@ -608,6 +610,9 @@ function act() {
 
 /** Shows the plants that the program's ports fit, and the parameters of the one that closes the loop. */
 function showPlants() {
+  // Of a program with parameters, these are what one sets; its constants are there when they are asked for.
+  if (state.tuned !== state.document?.id) el("tuning").open = !state.program.parameters.length;
+  state.tuned = state.document?.id;
   const { plants } = state.program, here = plants.find(({ name }) => name === state.plant?.name), choice = el("plant-name");
   el("loop").hidden = !plants.length;
   choice.replaceChildren(...plants.map(({ name, text, gives }) => new Option(`${text}: ${gives.join(", ")}`, name)), new Option("the table alone, without a plant", ""));
@@ -964,7 +969,7 @@ async function openAddress(first) {
     }
   } catch (error) {
     const instead = first ? (last ? `Your last text, ${last.name}, is shown instead.` : `The first example is shown instead.`) : "The text is as it was.";
-    complaint = `The link is damaged: ${error.message}. ${instead} Ask for the link again, or for the source.`;
+    complaint = /^there is no example/.test(error.message) ? `The link leads to no program: ${error.message}. ${instead}` : `The link is damaged: ${error.message}. ${instead} Ask for the link again, or for the source.`;
   }
   if (program) {
     const own = first ? last : state.document;
@@ -983,7 +988,8 @@ const KEYS = [
   ["F8", "run on to a breakpoint", () => step("continue")], ["Shift-F8", "run back to one", () => step("reverse")],
   ["Mod-Alt-e", "to the source", () => editor.focus()], ["Mod-Alt-c", "to the debugger's commands", () => (select("step"), el("command").focus())],
 ];
-const EDITOR_KEYS = [["Ctrl-Space", "complete"], ["F12", "to the definition"], ["Shift-F12", "references"], ["F2", "rename"], ["Shift-Alt-f", "format"], ["Ctrl-Shift-m", "diagnostics and their fixes"], ["Escape, then Tab", "leave the source"], ["← →", "between tabs"]];
+const EDITOR_KEYS = [["Ctrl-Space", "complete"], ["F12", "to the definition"], ["Shift-F12", "references"], ["F2", "rename"], ["Shift-Alt-f", "format"], ["Ctrl-Shift-m", "diagnostics and their fixes"], ["Escape, then Tab", "leave the source"], ["← →", "between tabs"],
+  ["drag, double click", "in a plot: zoom, and all again"], ["+ − 0", "in the pipeline: zoom, and all again"], ["[ ]", "in the pipeline: begin and end a range"]];
 
 function pressed(event) {
   const name = [event.ctrlKey || event.metaKey ? "Mod" : "", event.altKey ? "Alt" : "", event.shiftKey ? "Shift" : "", event.key.length === 1 ? event.key.toLowerCase() : event.key].filter(Boolean).join("-");

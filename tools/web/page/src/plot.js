@@ -24,6 +24,8 @@ const TALL = 0.6, TALL_NARROW = 0.46, NARROW = 480;
 const NEAR = 0.4;
 /** Below this magnitude, an axis has numbers such as `5e-6`: uPlot's own have three decimal places. */
 const TINY = 0.01;
+/** Time in which a second click makes a double click; ms. */
+const DOUBLE = 300;
 /** Tick distances of an integer axis. */
 const WHOLE = [...Array(10).keys()].flatMap((power) => [1, 2, 5].map((step) => step * 10 ** power));
 
@@ -166,7 +168,17 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   // A finger has no pointer above the chart: where it touches or moves, the values are told.
   for (const kind of ["pointerdown", "pointermove"]) plot.over.addEventListener(kind, (event) => event.pointerType === "touch" && plot.setCursor({ left: event.clientX - plot.over.getBoundingClientRect().left, top: plot.over.clientHeight / 2 }, true, true));
   // A click, not the end of a drag, which zooms; a finger only reads.
-  if (picked) plot.over.addEventListener("click", (event) => event.pointerType !== "touch" && Math.abs(event.clientX - down) < 3 && plot.cursor.idx !== null && plot.cursor.idx !== undefined && picked(plot.cursor.idx));
+  if (picked) {
+    let waits;
+    plot.over.addEventListener("dblclick", () => clearTimeout(waits));
+    plot.over.addEventListener("click", ({ clientX, detail, pointerType }) => {
+      const { idx } = plot.cursor;
+      clearTimeout(waits);
+      if (pointerType === "touch" || detail > 1 || Math.abs(clientX - down) >= 3 || idx === null || idx === undefined) return;
+      // A second click would end the zoom.
+      waits = setTimeout(() => picked(idx), DOUBLE);
+    });
+  }
   const resize = () => parent.clientWidth && plot.setSize({ width: width(), height: height() });
   const observer = new ResizeObserver(resize);
   observer.observe(parent);
@@ -343,11 +355,12 @@ export class Plots {
 
   /** Height of a chart: the charts fill the panel, unless there are too many. */
   height(count, folded) {
+    // A telephone's panel is as tall as its content: the charts do not follow it.
+    if (this.narrow.matches) return Math.round(TALL_NARROW * this.parent.parentElement.clientWidth);
     const panel = this.parent.parentElement, above = this.parent.offsetTop - panel.offsetTop;
     // Space for a chart's title, and the gap below it.
     const room = (panel.clientHeight - above - 16 - folded * FOLDED) / Math.max(1, count) - 32;
-    const tall = panel.clientWidth < NARROW ? TALL_NARROW : TALL;
-    return Math.round(Math.min(HIGH, tall * panel.clientWidth, Math.max(LOW, room)));
+    return Math.round(Math.min(HIGH, TALL * panel.clientWidth, Math.max(LOW, room)));
   }
 
   size() {
@@ -412,7 +425,8 @@ export class Plots {
     if (!this.parent.clientWidth) return;
     if (!run.cycles.length) return say("There is nothing to plot over periods: the program has run through no period.");
     say(this.silence());
-    if (before) this.parent.append(Object.assign(document.createElement("p"), { className: "ghost", textContent: `pale: before, with ${before.differs}` }));
+    const ghost = Object.assign(document.createElement(this.narrow.matches ? "p" : "span"), { className: "ghost", textContent: before ? `pale: before, with ${before.differs}` : "" });
+    if (before && this.narrow.matches) this.parent.append(ghost);
     const cycles = [{ name: "cycles", values: run.cycles, stepped: true, ...(before && { before: before.cycles }) }];
     const checks = program.residual && run.inputs[`${program.residual[0]}11`] ? [{ curves: [{ name: "largest |A·x − b|", points: true, values: residual(run, program.residual) }] }] : [];
     const all = [...checks, ...this.groups().map((curves) => ({ curves })), { curves: cycles, lines: this.levels() }];
@@ -420,6 +434,8 @@ export class Plots {
     const height = () => this.height(open.length, all.length - open.length);
     const { from, changes, picked } = this.mark ?? { changes: [] }, moments = [...new Set([...changes.map(({ period }) => period), ...(from > 1 ? [from] : [])])].map((period) => period - 1);
     for (const one of all) this.charts.push(chart(this.narrow.matches && one === open[0] ? this.lead : this.parent, { ...one, ...common, ...(one === last && { label }), height, sync: "ports", folds: true, moments, picked: picked && ((index) => picked(index + 1)) }));
+    // Beside a heading it moves no curve.
+    if (before && !this.narrow.matches) this.charts[0].head.append(" ", ghost);
   }
 
   /** What to say if inputs are 0 because nobody gives them. */

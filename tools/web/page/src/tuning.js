@@ -75,6 +75,7 @@ export class Tuning {
     const element = node("div", { className: "constant", title: text ?? "" }, node("b", { textContent: name }), least, slider, most, field, node("small", { textContent: unit ?? "" }), formula);
     const row = { element, slider, least, most, field, formula, constant };
     const fit = () => {
+      for (const end of [least, most]) end.style.width = `${end.value.length + 1}ch`;
       const range = Math.abs(most.value - least.value) || 1;
       Object.assign(slider, { min: least.value, max: most.value, step: whole ? 1 : 10 ** (Math.floor(Math.log10(range)) - DIGITS) });
     };
