@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_outputs: the output ports as seen from outside: merges the writes of all slots into one set of ports.
 //
-// Each bank has a memory of its own, since a memory has one write port. A live-value table, which holds the bank that wrote each
-// port last, selects among them.
+// Each bank has a memory of its own, since a memory has one write port. The bank that wrote a port last follows from memories with
+// one write port, too: of two banks, each keeps a bit for every port, and the earlier bank wrote last if the bits are equal. A
+// write makes them equal or different, whatever the other bank's bit is. A table of owners with a write port for each bank would
+// be flip-flops, four times as large.
 //
 // Contract
 //   write, index, value: a write to an output port of each bank, in the cycle of its writeback. The latest write to a port counts;
@@ -73,21 +75,48 @@ module takt_outputs #(
             always @* shown = stands;
             wire unused_one = &{1'b0, write_at};
         end else begin : g_several
-            // The bank that was written last.
-            localparam OWNER = $clog2(BANKS);
-            reg  [OWNER-1:0] owner [0:DEPTH-1];
-            wire [OWNER-1:0] read_owner = owner[read_at[ADDRESS-1:0]];
-            reg  [OWNER-1:0] read_owner_q;
-            always @(posedge clk) read_owner_q <= read_owner;
-            wire [OWNER-1:0] of_number = READ_DELAY == 0 ? read_owner : read_owner_q;
-            integer k;
-            always @(posedge clk) begin
-                for (k = 0; k < BANKS; k = k + 1) if (write[k]) owner[write_at[k*ADDRESS +: ADDRESS]] <= k[OWNER-1:0];
+            // told[b*BANKS+k]: bit of bank b against bank k, at the port that bank k writes; kept: at the port that is read. A word
+            // that was never written counts as 0 in simulation, where it is undefined. yields: bank k, a later one than b, writes
+            // the same port in this cycle.
+            wire [BANKS*BANKS-1:0] told, kept, yields;
+            genvar k;
+            for (b = 0; b < BANKS; b = b + 1) begin : g_order
+                reg  [BANKS-2:0] order [0:DEPTH-1];
+                wire [BANKS-2:0] read = order[read_at[ADDRESS-1:0]];
+                wire [BANKS-2:0] next;
+                for (k = 0; k < BANKS; k = k + 1) begin : g_other
+                    if (k == b) begin : g_itself
+                        assign {told[b*BANKS+k], kept[b*BANKS+k], yields[b*BANKS+k]} = 3'd0;
+                    end else begin : g_pair
+                        localparam BIT = k < b ? k : k - 1;
+                        assign told[b*BANKS+k]   = order[write_at[k*ADDRESS +: ADDRESS]][BIT] === 1'b1;
+                        assign kept[b*BANKS+k]   = read[BIT] === 1'b1;
+                        assign yields[b*BANKS+k] = (k > b) & write[k] &
+                            (write_at[k*ADDRESS +: ADDRESS] == write_at[b*ADDRESS +: ADDRESS]);
+                        assign next[BIT]         = told[k*BANKS+b] ^ (k < b);
+                    end
+                end
+                wire orders = write[b] & ~|yields[b*BANKS +: BANKS];
+                always @(posedge clk) if (orders) order[write_at[b*ADDRESS +: ADDRESS]] <= next;
             end
-            integer j;
+
+            // The bank that wrote the port last: it is later than all others.
+            reg  [BANKS-1:0] read_last, read_last_q;
+            integer i, j;
+            always @* begin
+                read_last = {BANKS{1'b1}};
+                for (i = 0; i < BANKS; i = i + 1) begin
+                    for (j = 0; j < i; j = j + 1) begin
+                        if (kept[i*BANKS+j] == kept[j*BANKS+i]) read_last[i] = 1'b0;
+                        else read_last[j] = 1'b0;
+                    end
+                end
+            end
+            always @(posedge clk) read_last_q <= read_last;
+            wire [BANKS-1:0] of_number = READ_DELAY == 0 ? read_last : read_last_q;
             always @* begin
                 shown = stands[31:0];
-                for (j = 1; j < BANKS; j = j + 1) if (of_number == j[OWNER-1:0]) shown = stands[32*j +: 32];
+                for (j = 1; j < BANKS; j = j + 1) if (of_number[j]) shown = stands[32*j +: 32];
             end
         end
     endgenerate

@@ -86,7 +86,7 @@ const COMMON: &[Fault] = &[
     ("takt_memory", "sum[ADDRESS-1:0]", "{1'b0, sum[ADDRESS-2:0]}"),
     ("takt_memory", "sum[15:0] >> ADDRESS", "sum[15:0] >> (ADDRESS+1)"),
     ("takt_outputs", "words[read_at[ADDRESS-1:0]]", "words[{1'b0, read_at[ADDRESS-2:0]}]"),
-    ("takt_outputs", "owner[read_at[ADDRESS-1:0]]", "owner[{1'b0, read_at[ADDRESS-2:0]}]"),
+    ("takt_outputs", "order[read_at[ADDRESS-1:0]]", "order[{1'b0, read_at[ADDRESS-2:0]}]"),
     // Loops: the counts, the levels as of issue and as of fetch, the refill after a short body. The proof in CI refutes the first fault,
     // too.
     ("takt_loops", "x_count != 16'd1", "1'b1"),
@@ -167,7 +167,8 @@ const OF_T4: &[Fault] = &[
     ("takt_memory", "word[ADDRESS +: ADDRESS]", "{word[ADDRESS+1 +: ADDRESS-1], 1'b0}"),
     ("takt_onehot_mux", "choices[2*i] | choices[2*i+1]", "choices[2*i]"),
     ("takt_hazard", "|hit[MIDDLE-1:3]", "|hit[MIDDLE-1:4]"),
-    ("takt_outputs", "k[OWNER-1:0]", "k[OWNER-1:0] & ~1"),
+    ("takt_outputs", "told[k*BANKS+b] ^ (k < b)", "k < b"),
+    ("takt_outputs", "write[b] & ~|yields[b*BANKS +: BANKS]", "write[b]"),
     ("takt_memory", "same ? read : second", "second"),
     ("takt_memory", "same ? read : second", "read"),
     ("takt_memory", "x_store & ~(|fault) & ~cancel", "x_store & ~fault[0] & ~cancel"),
@@ -225,7 +226,7 @@ const OF_LATCHED: &[Fault] = &[
     ("takt_double_buffer", "{PORTS{~flip & ~drop}}", "{PORTS{~drop}}"),
     ("takt_double_buffer", "shown ^ changed", "~shown"),
     ("takt_double_buffer", "write[k] & ~open & (index >> BITS) == 0", "write[k] & (index >> BITS) == 0"),
-    ("takt_outputs", "of_number == j[OWNER-1:0]", "1'b0"),
+    ("takt_outputs", "of_number[j]", "1'b0"),
     ("takt_sequencer", "x_wait & ~fault", "x_wait & ~remembered & ~fault"),
     ("takt_source", "advance ? m_place : r_place", "1'b0"),
 ];
