@@ -3,8 +3,8 @@
 //
 // Contract
 //   x_load[p], x_store, with the operands of port p in a (base) and b (the value to store), come in the cycle after issue. Stores are
-//   port 0's. A load's result is valid (out_valid[p]) in cycle LATENCY after issue; beside a store to its word it is the word's old
-//   value. fault[p]: the address is outside of the memory; neither port's access has an effect then.
+//   port 0's. A load's result is valid (out_valid[p]) in cycle LATENCY after issue, and 0 in other cycles; beside a store to its word
+//   it is the word's old value. fault[p]: the address is outside of the memory; neither port's access has an effect then.
 //   cancel: the accesses in execute are dropped.
 //   load_write: the loader writes, in reset.
 //
@@ -85,7 +85,7 @@ module takt_memory #(
             always @(posedge clk) begin
                 if (write) words[address] <= value;
                 else read <= words[address];
-                result <= read;
+                result <= read & {32{delivers}};
             end
         end else begin : g_two
             // Port 0 reads the old word when it writes (block RAM mode READBEFOREWRITE). Port 1 reads an undefined word
@@ -101,7 +101,7 @@ module takt_memory #(
                 read <= words[address];
                 if (write & (other == address)) second <= 32'hxxxxxxxx;
                 else second <= words[other];
-                result <= {same ? read : second, read};
+                result <= {(same ? read : second) & {32{delivers[PORTS-1]}}, read & {32{delivers[0]}}};
             end
         end
     endgenerate

@@ -13,6 +13,8 @@
 //! another unit's module takes over that unit's codes: `//@ as alu`. The other ports follow from the unit's row in the table of units:
 //! there are as many operands (`a`, `b`, `c`) as its instructions have sources. If a machine's row uses only a part of the unit's
 //! functions, the ports are the same.
+//!
+//! `//@ clears` states that result and flags are 0 without out_valid: the slot's bus takes them without a gate.
 
 use crate::{files, tables};
 use std::collections::BTreeMap;
@@ -44,6 +46,8 @@ pub struct Circuit {
     pub operations: Vec<Operation>,
     /// The module has a parameter INTERVAL besides LATENCY.
     pub has_interval: bool,
+    /// Result and flags are 0 without `out_valid`.
+    pub clears: bool,
     /// Files of the library that the circuit needs, in dependency order, its own last.
     pub files: Vec<String>,
 }
@@ -62,7 +66,7 @@ pub enum CircuitError {
     NoFile(&'static str, String),
     /// A line with `//@` that cannot be parsed.
     #[error(
-        "`{0}`: expected `//@ op <width>'b<bits> <mnemonic> …`, `//@ op - <mnemonic> …` or `//@ as <unit>`"
+        "`{0}`: expected `//@ op <width>'b<bits> <mnemonic> …`, `//@ op - <mnemonic> …`, `//@ as <unit>` or `//@ clears`"
     )]
     Syntax(String),
     /// Operation codes of different widths.
@@ -211,7 +215,8 @@ impl Library {
         files.push(own_file);
         let files = self.with_common(files);
         let has_interval = text.contains("parameter INTERVAL");
-        Ok(Circuit { unit: *unit, op_bits, operands, operations, has_interval, files })
+        let clears = text.lines().any(|line| line == CLEARS);
+        Ok(Circuit { unit: *unit, op_bits, operands, operations, has_interval, clears, files })
     }
 
     /// Adds the files of `common/` whose modules are instantiated, transitively, in dependency order.
@@ -248,6 +253,9 @@ impl Circuit {
     }
 }
 
+/// Line of a header: result and flags are 0 without `out_valid`.
+const CLEARS: &str = "//@ clears";
+
 /// Statements of a header.
 struct Codes {
     /// Width of the `op` port; 0 without such a port.
@@ -264,7 +272,7 @@ fn codes(unit: &Unit, text: &str) -> Result<Codes, CircuitError> {
     let (mut width, mut operands) = (None, 0);
     // The table's row has all functions of the unit; a machine's row may have fewer.
     let whole = UNITS.iter().find(|row| row.name == unit.name).unwrap_or(unit);
-    for line in text.lines().filter(|line| line.starts_with("//@")) {
+    for line in text.lines().filter(|line| line.starts_with("//@") && *line != CLEARS) {
         let syntax = || CircuitError::Syntax(line.to_owned());
         let mut words = line.strip_prefix("//@ op ").ok_or_else(syntax)?.split_whitespace();
         let (bits, code) = words.next().and_then(code).ok_or_else(syntax)?;

@@ -14,6 +14,7 @@
 //@ op 3'b011 imul24
 //@ op 3'b100 itof
 //@ op 3'b101 ftoi
+//@ clears
 //
 // Method: all operations go through one right shift, one sum, one left shift and one rounding:
 //   sum, difference   the operand of smaller magnitude, S, is aligned with the other, L, and added or subtracted
@@ -345,6 +346,7 @@ module takt_addmul #(
             result[21:0]  <= 22'd0;
         end
         flags <= {invalid6, 1'b0, ~special6 & ~to_integer6 & (overflows | (&rounded[31:24]))};
+        if (~valid[6]) {result, flags} <= 35'd0;
     end
 
     wire unused = &{1'b0, exponents[0], to_right[0], product_exponent[9], number6[32], rounded[0], sum[0]};

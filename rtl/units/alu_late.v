@@ -6,6 +6,7 @@
 //   it has the fewest bits.
 //
 //@ as alu
+//@ clears
 
 module takt_alu_late #(
     parameter LATENCY = 5
@@ -37,11 +38,12 @@ module takt_alu_late #(
             takt_alu_late_has_latency_3_to_16 unsupported ();
         end else begin : g_wait
             reg [36*WAIT-1:0] waiting;
-            if (WAIT == 1) begin : g_1
-                always @(posedge clk) waiting <= {alu_valid, alu_result, alu_flags};
-            end else begin : g_more
-                always @(posedge clk) waiting <= {waiting[36*(WAIT-1)-1:0], alu_valid, alu_result, alu_flags};
+            wire [36*WAIT+35:0] next = {waiting, alu_valid, alu_result, alu_flags};
+            always @(posedge clk) begin
+                waiting <= next[36*WAIT-1:0];
+                if (~next[36*WAIT-1]) waiting[36*WAIT-2 -: 35] <= 35'd0;
             end
+            wire unused = &{1'b0, next[36*WAIT+35 -: 36]};
             assign {out_valid, result, flags} = waiting[36*WAIT-1 -: 36];
         end
     endgenerate

@@ -9,6 +9,7 @@
 //   7fc00000 beyond 1 and for a NaN.
 //
 //@ op - facos
+//@ clears
 //
 // Method (acos.rs gives reasons and widths): with t = 1 - |x|, acos |x| = sqrt(2 t) G(t). G is a piecewise linear function from a
 // table, its slope multiplied digit by digit. The square root is a digit recurrence of two bits per cycle, and each of its digits
@@ -188,6 +189,7 @@ module takt_arccosine #(
         field   <= negative_19 ? 8'd127 : 8'd127 - {4'd0, e_19};
         result  <= refused_19 ? 32'h7fc00000 : {1'b0, rounded & {31{negative_19 | ~zero_19}}};
         flags   <= {refused_19, 2'b00};
+        if (~at[28]) {result, flags} <= 35'd0;
     end
 
     wire unused = &{1'b0, second_0[30:28], second_1[30:28], first[29:26], product[10:0], angle[5:0]};

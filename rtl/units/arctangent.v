@@ -10,6 +10,7 @@
 //   [-pi, pi]; invalid and 7fc00000 for a NaN.
 //
 //@ op - fatan2
+//@ clears
 //
 // Method (atan.rs gives reasons and widths): a restoring radix-4 division of the lesser magnitude by the greater. Its first digits
 // select an arctangent from a table. The remainder is then divided by a larger divisor, to which those digits' multiples of the
@@ -247,6 +248,7 @@ module takt_arctangent #(
     always @(posedge clk) begin
         result <= nan_19 ? 32'h7fc00000 : {sign_19, rounded & {31{~zero_19}}};
         flags  <= {nan_19, 2'b00};
+        if (~at[22]) {result, flags} <= 35'd0;
     end
 
     wire unused = &{1'b0, a_signaling, b_signaling, e_2[9], twice[24], value[4:0], less_1[30:29], less_2[30:29], less_3[30:29], carries[31]};

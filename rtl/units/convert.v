@@ -8,6 +8,7 @@
 //
 //@ op 1'b0 itof
 //@ op 1'b1 ftoi
+//@ clears
 //
 // Method: both directions share one datapath. A fixed-point number is shifted right. With n for the integer part and up (0 or 1) for
 // rounding, taking the magnitude (itof) or applying the sign (ftoi) of a negative number is one addition,
@@ -136,6 +137,7 @@ module takt_convert #(
     always @(posedge clk) begin
         result <= too_large2 ? {saturate_low2, {31{~saturate_low2}}} : sum;
         flags  <= {invalid2, 2'b00};
+        if (~valid2) {result, flags} <= 35'd0;
     end
 
 endmodule

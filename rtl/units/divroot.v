@@ -9,6 +9,7 @@
 //
 //@ op 1'b0 fdiv
 //@ op 1'b1 fsqrt
+//@ clears
 //
 // Method: digit recurrence of very high radix, with two digits. A table gives Y, an approximation of the reciprocal of the divisor b
 // (of the reciprocal root of the radicand) that is too small by at most 2^-13. In parentheses, the same for a root. With the operand
@@ -292,6 +293,7 @@ module takt_divroot #(
             result[21:0] <= 22'd0;
         end
         flags <= flags_9;
+        if (~valid[9]) {result, flags} <= 35'd0;
     end
 
     wire unused = &{1'b0, root[9], exponent_4[9], exponent[9:8], first_product[35:33], first_product[17:0], low_6[35:27],

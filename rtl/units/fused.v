@@ -17,6 +17,7 @@
 //@ op 4'b0101 imul24
 //@ op 4'b1000 fadd
 //@ op 4'b1001 fsub
+//@ clears
 //
 // op[0] negates the addend, op[1] the product; op[2]: the addend is a zero of the product's sign, which changes no product;
 // op[3]: a + b is computed as a · 1 + b. op[2] and op[0]: the low 24 bits of a and b, without their signs, are multiplied; the addend
@@ -329,6 +330,7 @@ module takt_fused #(
             result[30:0] <= rounded;
         end
         flags <= {invalid4, 1'b0, ~special & ~zero4 & ~integers4 & (too_large | rounds_to_infinity)};
+        if (~valid4) {result, flags} <= 35'd0;
     end
 
 endmodule

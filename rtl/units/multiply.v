@@ -8,6 +8,7 @@
 //
 //@ op 1'b0 fmul
 //@ op 1'b1 imul24
+//@ clears
 //
 // Method: the significands are multiplied without normalisation, leading zeros of a subnormal included. A single shift then serves
 // two purposes: to the left, it normalises such a product, as far as its exponent allows; to the right, it denormalises a product
@@ -185,6 +186,7 @@ module takt_multiply #(
             result[30:0] <= rounded;
         end
         flags <= {invalid3, 1'b0, ~nan3 & (overflow3 | (~infinite3 & (top_overflows | rounds_to_infinity)))} & {3{~integer3}};
+        if (~valid3) {result, flags} <= 35'd0;
     end
 
 endmodule

@@ -11,6 +11,7 @@
 //
 //@ op 1'b0 fdiv
 //@ op 1'b1 fsqrt
+//@ clears
 //
 // Method: restoring recurrence, two bits per cycle. The next bit of a quotient is 1 if the divisor d is not more than twice the
 // remainder; d is then subtracted. The next bit of a root is found in the same way, with 2 q + m instead of d, q being the root so
@@ -207,6 +208,7 @@ module takt_recurrence #(
         result[22:0]  <= rounded[22:0];
         if (fixed) result[22:0] <= {nan, 22'd0};
         flags <= {invalid, by_zero, overflow};
+        if (~at[19]) {result, flags} <= 35'd0;
     end
 
     wire unused = &{1'b0, sum_3[0], less_first[27:26], less_second[27:26], less_both[27:26]};

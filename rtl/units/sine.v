@@ -10,6 +10,7 @@
 //
 //@ op 1'b0 fsin
 //@ op 1'b1 fcos
+//@ clears
 //
 // Method (sin.rs gives reasons and widths): argument reduction by the nearest multiple of pi/2, k pi/2, leaves r = |x| - k pi/2. The
 // result is n - n V(r): for the sine of r, n = |r| normalised and V = 1 - sin(r)/r; for the cosine of r, n = 1 and
@@ -274,6 +275,7 @@ module takt_sine #(
     always @(posedge clk) begin
         result <= refused12 ? 32'h7fc00000 : {negative12, rounded};
         flags  <= {refused12, 2'b00};
+        if (~valid[12]) {result, flags} <= 35'd0;
     end
 
     wire unused = &{1'b0, by163[13:0], slope_product[15:0], v[1:0], high_high[1:0], low_high[35:15], result12[10:0]};

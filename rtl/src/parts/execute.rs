@@ -31,7 +31,8 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
 
     m.banner("units");
     m.comment(
-        "At most one unit drives its slot's bus in a cycle (rule 6); the bus is the OR of all results, those of idle units being 0. An \
+        "At most one unit drives its slot's bus in a cycle (rule 6); the bus is the OR of all results, those of idle units being 0: \
+         most units clear them, whose registers' reset costs no logic; the others have a gate. An \
          operation that issues in cycle c is on its unit's inputs in c + 1, and its result is on the bus in c + latency.",
     );
     m.blank();
@@ -142,6 +143,7 @@ fn memory(plan: &Plan, m: &mut Module) {
             .port("address", plan.memory_address())
             .port("value", net::STORED_VALUE),
     );
+    m.unused(plan.load_unused(), plan.load_valid(), None);
     let at_fault =
         |slot: &SlotPlan| plan.port_of(slot).map_or(decimal(1, 0_u32), |port| plan.port_fault().at(port));
     m.assign(plan.x_address_fault(), plan.each(at_fault));
@@ -175,11 +177,17 @@ fn units(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
         m.wires([slot.unit_result(unit)]);
         m.wires([slot.unit_flags(unit)]);
         m.instance(instance(slot, circuit));
-        results.push(gated(32, slot.unit_valid(unit), slot.unit_result(unit)));
-        flags.push(gated(3, slot.unit_valid(unit), slot.unit_flags(unit)));
+        if circuit.clears {
+            m.unused(slot.unit_unused(unit), slot.unit_valid(unit), None);
+            results.push(slot.unit_result(unit).into());
+            flags.push(slot.unit_flags(unit).into());
+        } else {
+            results.push(gated(32, slot.unit_valid(unit), slot.unit_result(unit)));
+            flags.push(gated(3, slot.unit_valid(unit), slot.unit_flags(unit)));
+        }
     }
     if let Some(port) = plan.port_of(slot) {
-        results.push(gated(32, plan.load_valid().at(port), plan.load_result().part(32 * port, 32)));
+        results.push(plan.load_result().part(32 * port, 32).into());
     }
     results.push(gated(32, slot.loaded(), net::LOADED_VALUE));
     m.regs([slot.loaded()]);

@@ -142,6 +142,11 @@ impl Plan {
         Net::bus("load_valid", self.ports())
     }
 
+    /// Dummy that keeps a linter from reporting [`Plan::load_valid`]: a load's result needs no gate.
+    pub fn load_unused(&self) -> Net {
+        Net::bit("unused_load_valid")
+    }
+
     /// For each port of the data memory, result of a load.
     pub fn load_result(&self) -> Net {
         Net::bus("load_result", 32 * self.ports())
@@ -461,6 +466,11 @@ impl SlotPlan {
     /// The unit's result is valid.
     pub fn unit_valid(&self, unit: &Unit) -> Net {
         self.of_unit(unit, "valid")
+    }
+
+    /// Dummy that keeps a linter from reporting [`SlotPlan::unit_valid`] of a unit whose result needs no gate.
+    pub fn unit_unused(&self, unit: &Unit) -> Net {
+        self.of_unit(unit, "unused_valid")
     }
 
     /// Result of the unit, in its writeback cycle.
