@@ -158,7 +158,7 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
     axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }), ...(isTiny && { values: (_, splits) => splits.map(short) }) }],
     legend: { show: false }, cursor: { y: false, ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
     series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}${style("--pale")}`, width: 1.6, points: { show: false }, pxAlign: 0, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...drawn.map(({ i, ...curve }) => ({
-      label: curve.name, stroke: look[i].colour, width: curve.given && !curves.every((one) => one.given) ? 1.1 : 1.6, dash: look[i].dash, pxAlign: 0, points: { show: true, filter: () => x.length < 40 || curve.points ? null : alone(curve.values), size: curve.points ? 6 : 4, ...(curve.points && { fill: look[i].colour }) },
+      label: curve.name, stroke: look[i].colour, width: curve.given && !curves.every((one) => one.given) ? 1.1 : 1.6, dash: look[i].dash, pxAlign: 0, points: { show: true, filter: () => x.length < 40 || curve.points ? null : alone(curve.values), size: curve.points ? 6 : 4, fill: look[i].colour },
       ...(curve.points && { paths: () => null, single: true }), ...(curve.stepped && { paths: stepped, stepped: true }),
     }))],
     hooks: { setCursor: [({ cursor: { idx } }) => (at.textContent = idx === null || idx === undefined ? "" : said(idx))], draw: [(plot) => mark(plot.ctx, plot, { x, levels, lost, saturated, moments })] },
