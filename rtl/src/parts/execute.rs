@@ -187,7 +187,7 @@ fn units(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
         }
     }
     if let Some(port) = plan.port_of(slot) {
-        results.push(plan.load_result().part(32 * port, 32).into());
+        results.push(plan.load_result().part(32 * port, 32));
     }
     results.push(gated(32, slot.loaded(), net::LOADED_VALUE));
     m.regs([slot.loaded()]);
