@@ -412,7 +412,10 @@ const LAMP: &str = "clock = 50\nperiod = 10\nautostart = true\n[signals]\ntick =
 const PROGRAM: &str = "
 .input x:int
 .output y:int
-.reg s:int
+.state s:int
+.once
+        s = 0
+        wait p
 .period
 p:      iadd s, s, 1
         iand y, s, 1
