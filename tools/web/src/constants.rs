@@ -47,7 +47,7 @@ pub(crate) fn settable(assembled: &AssembledProgram) -> Vec<Value> {
             return None;
         }
         let is_time = unit.as_deref().is_some_and(|unit| TIMES.contains(&unit));
-        let is_above_zero = number.real() > 0.0 && (is_time || divisors.contains(&name));
+        let is_above_zero = number.real() > 0.0 && (is_time || divisors.contains(name));
         let low = is_above_zero.then(|| number.real() * LEAST);
         let from = offsets.units_at(start);
         let to = offsets.units_at(end);

@@ -87,7 +87,7 @@ fn clause(rest: &mut &[u8]) -> Result<Vec<Lit>> {
         }
         match number {
             0 => return Ok(found),
-            number if number >= 2 && number <= 2 * MOST + 1 => found.push(number - 2),
+            number if (2..=2 * MOST + 1).contains(&number) => found.push(number - 2),
             _ => bail!("there is no literal {number}"),
         }
     }
