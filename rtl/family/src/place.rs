@@ -83,10 +83,44 @@ pub struct Models {
     /// Truth table, as a text of bits, of a cell of a routed netlist that is plain logic: a place to plant a fault. `None` for other
     /// cells.
     pub truth_table: for<'a> fn(&'a mut Value) -> Option<&'a mut Value>,
-    /// Verilog for yosys' `techmap` that turns tables of a mapped netlist into yosys' own cells.
-    pub mapped_table: File,
+    /// Table of a mapped netlist.
+    pub mapped_table: MappedTable,
     /// Files of yosys' library that a mapped netlist needs, by their paths there.
     pub mapped_library: &'static [&'static str],
+}
+
+impl Models {
+    /// The models, if the feature `netlist` is on; without it nothing refers to them.
+    pub(crate) const fn if_wanted(self) -> Option<Models> {
+        if cfg!(feature = "netlist") { Some(self) } else { None }
+    }
+}
+
+/// Look-up table of four inputs, as yosys maps to it.
+#[derive(Clone, Copy, Debug)]
+pub struct MappedTable {
+    /// Cell of yosys' netlist.
+    pub cell: &'static str,
+    /// Inputs; the first is the lowest bit of the address.
+    pub inputs: [&'static str; 4],
+    /// Output.
+    pub output: &'static str,
+    /// Parameter with the contents.
+    pub contents: &'static str,
+}
+
+impl MappedTable {
+    /// Verilog for yosys' `techmap` that turns the table into yosys' own cell.
+    pub fn techmap(&self) -> String {
+        let MappedTable { cell, inputs: [a, b, c, d], output, contents } = self;
+        format!(
+            "module {cell} (input {a}, {b}, {c}, {d}, output {output});
+    parameter [15:0] {contents} = 16'd0;
+    \\$lut #(.WIDTH(4), .LUT({contents})) table4 (.A({{{d}, {c}, {b}, {a}}}), .Y({output}));
+endmodule
+"
+        )
+    }
 }
 
 /// A file of yosys' library.

@@ -868,6 +868,22 @@ fn editors_leave_other_assemblers_alone() {
     assert!(std::path::Path::new(editors).join("../..").join(grammar).is_dir(), "{grammar}");
 }
 
+/// Neovim without a screen and without a user's files, which are in a folder; a script leaves what it found in the file `OUT`.
+fn neovim(folder: &Folder) -> Command {
+    let mut command = Command::new("nvim");
+    command.args(["--headless", "--clean", "-n"]).current_dir(folder.path());
+    command.env("OUT", folder.path().join("found.json"));
+    command.env("XDG_STATE_HOME", folder.path()).env("XDG_CACHE_HOME", folder.path());
+    command
+}
+
+/// Runs Neovim; returns what its script found, and the standard error.
+fn found_by(command: &mut Command, folder: &Folder) -> (Value, String) {
+    let output = command.output().expect("nvim is there: `cargo xtask test` installs it");
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    (serde_json::from_str(&folder.read_text("found.json")).unwrap(), stderr)
+}
+
 /// With the shipped configuration, Neovim shows the cycles beside the lines and above the sections: before 0.10 it has no inlay hints of its
 /// own.
 #[test]
@@ -894,18 +910,10 @@ fn neovim_shows_the_cycles() {
         vim.fn.writefile({ vim.fn.json_encode(found) }, vim.env.OUT)
         vim.cmd('qall!')";
     folder.write("look.lua", script);
-    let output = Command::new("nvim")
-        .args(["--headless", "--clean", "-n", "-c", "filetype on", "-c", &format!("luafile {configuration}")])
-        .args(["-c", "edit gains.s", "-c", "luafile look.lua"])
-        .current_dir(folder.path())
-        .env("PATH", path)
-        .env("OUT", folder.path().join("found.json"))
-        .env("XDG_STATE_HOME", folder.path())
-        .env("XDG_CACHE_HOME", folder.path())
-        .output()
-        .expect("nvim is there: `cargo xtask test` installs it");
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    let found: Value = serde_json::from_str(&folder.read_text("found.json")).unwrap();
+    let mut command = neovim(&folder);
+    command.args(["-c", "filetype on", "-c", &format!("luafile {configuration}")]);
+    command.args(["-c", "edit gains.s", "-c", "luafile look.lua"]).env("PATH", path);
+    let (found, stderr) = found_by(&mut command, &folder);
     let all = |name: &str| {
         found[name].as_array().unwrap().iter().filter_map(Value::as_str).collect::<Vec<_>>().join("; ")
     };
@@ -921,17 +929,10 @@ fn neovim_uses_the_language_server() {
         folder.write(name, std::fs::read(source(name)).unwrap());
     }
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/clients/nvim_lsp.lua");
-    let output = Command::new("nvim")
-        .args(["--headless", "--clean", "-n", "-c", &format!("luafile {script}")])
-        .env("TAKT", env!("CARGO_BIN_EXE_takt"))
-        .env("FILE", folder.path().join("tracking.s"))
-        .env("OUT", folder.path().join("found.json"))
-        .env("XDG_STATE_HOME", folder.path())
-        .env("XDG_CACHE_HOME", folder.path())
-        .output()
-        .expect("nvim is there: `cargo xtask test` installs it");
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    let found: Value = serde_json::from_str(&folder.read_text("found.json")).unwrap();
+    let mut command = neovim(&folder);
+    command.args(["-c", &format!("luafile {script}")]);
+    command.env("TAKT", env!("CARGO_BIN_EXE_takt")).env("FILE", folder.path().join("tracking.s"));
+    let (found, stderr) = found_by(&mut command, &folder);
     assert_eq!(found.get("problem"), None, "{found}\n{stderr}");
     let text = |name: &str| found[name].as_str().unwrap_or_else(|| panic!("{name}: {found}")).to_owned();
     let (slot, unit) = T3.host(Function::Multiply).unwrap();

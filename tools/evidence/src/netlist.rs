@@ -67,12 +67,11 @@ pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
     let map = format!("{read}{commands}\n");
     progress::step(&format!("{}: mapping to {}", machine.name, family.text), || yosys("map.ys", map))?;
     let cells = mapped(&folder.join("mapped.json"), top, family)?;
-    let (table, text) = models.mapped_table;
-    fs::write(folder.join(table), text)?;
+    fs::write(folder.join("table.v"), models.mapped_table.techmap())?;
     fs::write(folder.join("cells.v"), format!("{WAIVER}{}", models.cells.map_or("", |(_, text)| text)))?;
     let library: String = models.mapped_library.iter().map(|path| format!(" +/{path}")).collect();
     let back = format!(
-        "read_json top.json\ntechmap -map {table}\nread_verilog{library}\n\
+        "read_json top.json\ntechmap -map table.v\nread_verilog{library}\n\
          read_verilog -lib cells.v\nhierarchy -check -top {top}\nproc\nflatten\nopt_expr\nopt_merge\nopt_clean -purge\n\
          write_verilog -noattr netlist.v\n"
     );

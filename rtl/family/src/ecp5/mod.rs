@@ -6,8 +6,8 @@ mod netlist;
 mod pll;
 
 use crate::{
-    Carry, Cells, Constraints, Family, File, FlashClock, Mapping, MeasurementDevice, Models, Oscillator,
-    Pack, Part, Pinout, Place, Pll, Proof, Pull, Synthesis, YosysFile, pins, room,
+    Carry, Cells, Constraints, Family, File, FlashClock, MappedTable, Mapping, MeasurementDevice, Models,
+    Oscillator, Pack, Part, Pinout, Place, Pll, Proof, Pull, Synthesis, YosysFile, pins, room,
 };
 use std::fmt::Write as _;
 use takt_isa::memory::{KBIT_18, Memories, Shape};
@@ -76,7 +76,7 @@ pub static FAMILY: Family = Family {
         arguments: |_| vec!["--input", "takt.config", "--bit", "takt.bit", "--compress"],
         bitstream: "takt.bit",
     }),
-    models: if cfg!(feature = "netlist") { Some(MODELS) } else { None },
+    models: MODELS.if_wanted(),
     bank: Some(Proof { synthesis: "synth_lattice -family ecp5", pins: bank::pins }),
     board: Some(Pinout {
         packages: &["CABGA256", "CSFBGA285", "CABGA381", "CABGA554", "CABGA756"],
@@ -98,14 +98,7 @@ const MODELS: Models = Models {
     mend: netlist::mend,
     tables: netlist::tables,
     truth_table: netlist::truth_table,
-    mapped_table: (
-        "table.v",
-        "module LUT4 (input A, B, C, D, output Z);
-parameter [15:0] INIT = 16'd0;
-\\$lut #(.WIDTH(4), .LUT(INIT)) table4 (.A({D, C, B, A}), .Y(Z));
-endmodule
-",
-    ),
+    mapped_table: MappedTable { cell: "LUT4", inputs: ["A", "B", "C", "D"], output: "Z", contents: "INIT" },
     mapped_library: &["lattice/common_sim.vh", "lattice/ccu2c_sim.vh"],
 };
 

@@ -8,8 +8,8 @@ mod netlist;
 mod pll;
 
 use crate::{
-    Carry, Cells, Constraints, Family, MeasurementDevice, Models, Oscillator, Pack, Part, Pinout, Place, Pll,
-    Pull, ROUTED, Sites, Synthesis, YosysFile, pins, room,
+    Carry, Cells, Constraints, Family, MappedTable, MeasurementDevice, Models, Oscillator, Pack, Part,
+    Pinout, Place, Pll, Pull, ROUTED, Sites, Synthesis, YosysFile, pins, room,
 };
 use std::fmt::Write as _;
 use takt_isa::memory::{KBIT_18, Memories, Shape};
@@ -47,7 +47,7 @@ const GW2A: Family = Family {
     synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw2a", top, netlist), files: FILES }),
     place: Some(PLACE),
     pack: Some(PACK),
-    models: if cfg!(feature = "netlist") { Some(MODELS) } else { None },
+    models: MODELS.if_wanted(),
     bank: None,
     board: Some(Pinout { packages: &["MG196", "PG256", "PG484", "EQ144", "QN88"], ..PINOUT }),
     flow: None,
@@ -90,14 +90,12 @@ const MODELS: Models = Models {
     mend: netlist::mend,
     tables: netlist::tables,
     truth_table: netlist::truth_table,
-    mapped_table: (
-        "table.v",
-        "module LUT4 (input I0, I1, I2, I3, output F);
-    parameter [15:0] INIT = 16'd0;
-    \\$lut #(.WIDTH(4), .LUT(INIT)) table4 (.A({I3, I2, I1, I0}), .Y(F));
-endmodule
-",
-    ),
+    mapped_table: MappedTable {
+        cell: "LUT4",
+        inputs: ["I0", "I1", "I2", "I3"],
+        output: "F",
+        contents: "INIT",
+    },
     mapped_library: &["gowin/cells_sim.v"],
 };
 

@@ -115,7 +115,7 @@ pub(super) fn tables(cells: Map<String, Value>) -> Map<String, Value> {
         }
         let kind = of["type"].as_str().unwrap_or_default();
         if let Some(width) = table_inputs(&of) {
-            // What nothing reads was left where a carry chain took its place.
+            // A carry chain took the place of a table that nothing reads.
             let Some(output) = net(&of, "F") else { continue };
             let inputs = (0..width).map(|i| pin(&of, &format!("I{i}"))).collect();
             let table = of["parameters"]["INIT"].as_str().unwrap_or_default();

@@ -5,8 +5,8 @@ mod netlist;
 mod pll;
 
 use crate::{
-    Cells, Constraints, Family, Mapping, MeasurementDevice, Models, Oscillator, Pack, Part, Pinout, Place,
-    Pll, Pull, Sites, Synthesis, YosysFile, pins, room,
+    Cells, Constraints, Family, MappedTable, Mapping, MeasurementDevice, Models, Oscillator, Pack, Part,
+    Pinout, Place, Pll, Pull, Sites, Synthesis, YosysFile, pins, room,
 };
 use std::fmt::Write as _;
 use takt_isa::memory::{BlockRam, Memories, Shape};
@@ -73,7 +73,7 @@ pub static FAMILY: Family = Family {
         arguments: |_| vec!["takt.asc", "takt.bin"],
         bitstream: "takt.bin",
     }),
-    models: if cfg!(feature = "netlist") { Some(MODELS) } else { None },
+    models: MODELS.if_wanted(),
     bank: None,
     board: Some(Pinout {
         packages: &["sg48", "uwg30"],
@@ -95,14 +95,12 @@ const MODELS: Models = Models {
     mend: netlist::mend,
     tables: netlist::tables,
     truth_table: netlist::truth_table,
-    mapped_table: (
-        "table.v",
-        "module SB_LUT4 (input I0, I1, I2, I3, output O);
-parameter [15:0] LUT_INIT = 16'd0;
-\\$lut #(.WIDTH(4), .LUT(LUT_INIT)) table4 (.A({I3, I2, I1, I0}), .Y(O));
-endmodule
-",
-    ),
+    mapped_table: MappedTable {
+        cell: "SB_LUT4",
+        inputs: ["I0", "I1", "I2", "I3"],
+        output: "O",
+        contents: "LUT_INIT",
+    },
     mapped_library: &["ice40/cells_sim.v"],
 };
 

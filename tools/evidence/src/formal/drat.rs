@@ -45,7 +45,7 @@ fn check(formula: &str, proof: &[u8]) -> Result<()> {
             return Ok(());
         }
     }
-    // Where units alone contradict one another, solvers leave the last step out.
+    // Solvers leave the last step out if clauses of one literal contradict one another.
     ensure!(checker.check_step(false, &[]), "the proof ends after {step} steps without the empty clause");
     Ok(())
 }
@@ -107,7 +107,7 @@ mod tests {
         let said = |formula: &str, proof: &[u8]| check(formula, proof).map_err(|error| format!("{error:#}"));
         // 1 follows, and then nothing is left.
         assert_eq!(said(FORMULA, &[b'a', 2, 0, b'a', 0]), Ok(()));
-        // The last step may be left out where units contradict one another.
+        // The last step may be left out if clauses of one literal contradict one another.
         assert_eq!(said(FORMULA, &[b'a', 2, 0]), Ok(()));
         assert_eq!(said("p cnf 1 2\n1 0\n-1 0\n", &[]), Ok(()));
         assert_eq!(said(FORMULA, &[b'd', 2, 4, 0, b'a', 0]), Err("step 2 does not follow".to_owned()));

@@ -417,10 +417,8 @@ const timed = () => `${state.name} ${el("machine").value.slice(0, 20)}`;
 function seconds() {
   const took = times()[timed()];
   if (took !== undefined) return { usual: Math.round(took) };
-  const isIt = (one) => one.name === state.name && one.source === editor.text && shipped(one, PERIODS).machine === el("machine").value;
   // On another machine it takes about as long.
-  const isNear = (one) => one.name === state.name && one.source === editor.text;
-  return { idle: (state.about.examples.find(isIt) ?? state.about.examples.find(isNear))?.seconds };
+  return { idle: exampleOf(state.name, editor.text)?.seconds };
 }
 
 /** Keeps the time of a result that took long. */
