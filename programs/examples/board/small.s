@@ -63,3 +63,4 @@ sine:                                   ; a quarter of a turn more than one: the
 .range  steps = -0x7fffff, 0x7fffff
 .range  v = -4*VMAX, 4*VMAX
 .range  si = -IMAX, IMAX
+; SPDX-License-Identifier: MIT OR Apache-2.0
