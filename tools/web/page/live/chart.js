@@ -248,12 +248,12 @@ export class Chart {
   }
 }
 
-/** Colours of curves by name: a name keeps the colour that it had first. */
+/** Colours of curves by name: a name keeps the place among the colours that it had first. */
 export class Colours {
   known = new Map();
 
   of(name) {
-    if (!this.known.has(name)) this.known.set(name, COLOURS[this.known.size % COLOURS.length]);
-    return this.known.get(name);
+    if (!this.known.has(name)) this.known.set(name, this.known.size);
+    return colour(this.known.get(name));
   }
 }

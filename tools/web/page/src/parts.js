@@ -1,9 +1,19 @@
 // Parts that the playground and the page of `takt live serve` share: elements, numbers, downloads, colours of curves.
 
-export const COLOURS = ["#2f6fbf", "#d9534f", "#5aa469", "#b07cd8", "#d98a1f", "#26a0a8", "#a3156b", "#8d6e63"];
+/** Colours of curves on a light and on a dark page. */
+const LIGHT = ["#2f6fbf", "#d9534f", "#5aa469", "#b07cd8", "#d98a1f", "#26a0a8", "#a3156b", "#8d6e63"];
+const DARK = ["#6fa8ee", "#ff8a80", "#84cf94", "#c9a2ee", "#f0b060", "#5cc8d0", "#ff8ac8", "#c4a294"];
+/** Number of different colours of curves. */
+export const COLOURS = LIGHT.length;
+
+/** Colour of curve `i` on the page as it is now. */
+export const colour = (i) => (matchMedia("(prefers-color-scheme: dark)").matches ? DARK : LIGHT)[i % COLOURS];
 
 /** Digits that a value keeps: those of a binary32 that people read. */
 const PRECISION = 6;
+
+/** A number's text with a minus sign instead of a hyphen. */
+export const signed = (text) => String(text).replace(/-/g, "−");
 
 /** Creates an element with properties and children. */
 export const node = (name, set = {}, ...children) => {

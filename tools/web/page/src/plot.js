@@ -1,13 +1,13 @@
 // Plots of port values over periods, one chart below another, with synchronised cursors.
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { COLOURS, short } from "./parts.js";
+import { COLOURS, colour, short, signed } from "./parts.js";
 import { Pen, drawing } from "./svg.js";
 
 /** Dashes of the curves in a chart, so that many differ in more than colour, and those of a reference. */
 const DASHES = [[], [], [14, 3], [9, 3, 2, 3]], REFERENCE = [2, 3];
 /** Maximum number of curves over one axis. */
-const TOGETHER = COLOURS.length;
+const TOGETHER = COLOURS;
 /** Ports beyond this number are offered when they are asked for. */
 const OFFERED = 16;
 /** Number of outputs that are shown initially, and most inputs that are. */
@@ -54,6 +54,9 @@ const isFlat = (curves) => curves.every(({ values, before }) => flat(values) && 
 
 const number = (value, unit) => `${isNumber(value) ? +value.toPrecision(7) : value ?? "not written"}${unit ? ` ${unit}` : ""}`;
 
+/** Returns the texts of an axis' numbers; uPlot's filter leaves null where there is no room. */
+const ticks = (isTiny) => (_, splits) => splits.map((value) => (value === null ? "" : signed(isTiny ? short(value) : uPlot.fmtNum(value))));
+
 let measuring;
 /** Width of a text on an axis in pixels. */
 function widthOf(text) {
@@ -82,7 +85,7 @@ function looks(curves) {
   return curves.map(({ name }) => {
     const i = bases.indexOf(name.replace(/_ref$/, "")), alone = !curves.some((other) => `${other.name}_ref` === name);
     const dash = isReference(name) && !alone ? REFERENCE : DASHES[i % DASHES.length];
-    return { colour: COLOURS[i % COLOURS.length], dash, line: { 0: "solid", 2: dash === REFERENCE ? "dotted" : "dashed" }[dash.length] ?? "dashed" };
+    return { colour: colour(i), dash, line: { 0: "solid", 2: dash === REFERENCE ? "dotted" : "dashed" }[dash.length] ?? "dashed" };
   });
 }
 
@@ -155,7 +158,7 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   const column = (values) => x.map((_, i) => (isNumber(values[i]) ? values[i] : null));
   const plot = new uPlot({
     width: width(), height: height(), padding: [6, 18, 0, 0], scales: { x: { time: false, range: (_, from, to) => [from, unit && x.length > 1 ? to + x[1] - x[0] : to] }, y: { range } },
-    axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }), ...(isTiny && { values: (_, splits) => splits.map(short) }) }],
+    axes: [{ ...axis, values: ticks(false), ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ?? " ", size, space: 22, ...(whole && { incrs: WHOLE }), values: ticks(isTiny) }],
     legend: { show: false }, cursor: { y: false, ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
     series: [{}, ...ghosts.map(({ i, ...curve }) => ({ stroke: `${look[i].colour}${style("--pale")}`, width: 1.6, points: { show: false }, pxAlign: 0, ...(curve.stepped && { paths: stepped, stepped: true }) })), ...drawn.map(({ i, ...curve }) => ({
       label: curve.name, stroke: look[i].colour, width: curve.given && !curves.every((one) => one.given) ? 1.1 : 1.6, dash: look[i].dash, pxAlign: 0, points: { show: true, filter: () => x.length < 40 || curve.points ? null : alone(curve.values), size: curve.points ? 6 : 4, fill: look[i].colour },

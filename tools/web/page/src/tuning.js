@@ -85,7 +85,9 @@ export class Tuning {
       fit();
       slider.value = value;
       field.value = short(value);
+      field.setCustomValidity("");
     };
+    field.addEventListener("input", () => field.setCustomValidity(""));
     for (const end of [least, most]) {
       end.addEventListener("change", () => {
         if (!isNumber(end.value)) {
@@ -109,7 +111,13 @@ export class Tuning {
       this.last = { row, at: performance.now() };
     });
     field.addEventListener("change", () => {
-      if (!isNumber(field.value)) return row.put(row.constant.value);
+      const text = field.value.trim();
+      if (!isNumber(text)) {
+        row.put(row.constant.value);
+        field.setCustomValidity(`${text ? `"${text}" is not a number` : "a number is missing"}: ${name} stays ${field.value}`);
+        field.reportValidity();
+        return;
+      }
       this.start(row);
       row.put(Number(field.value));
       this.set(row, Number(field.value));

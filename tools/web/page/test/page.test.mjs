@@ -536,7 +536,12 @@ test("titles of the menu are short, with the whole one beside; units and formula
   assert.equal(await row("DMAX").locator(".formula").textContent(), "= 0.95/sqrt(3)");
   assert.equal(await row("Ld").locator("small").textContent(), "H");
   assert.equal(await row("R").locator(".formula").textContent(), "");
-  await row("DMAX").locator(".field").fill("0.5");
+  const field = row("DMAX").locator(".field"), kept = await field.inputValue();
+  await field.fill("half");
+  await page.keyboard.press("Enter");
+  assert.equal(await field.evaluate((one) => one.validationMessage), `"half" is not a number: DMAX stays ${kept}`);
+  assert.equal(await field.inputValue(), kept);
+  await field.fill("0.5");
   await page.keyboard.press("Enter");
   await page.waitForFunction(() => /DMAX = 0\.5/.test(takt.text) && !takt.state.stale);
   await done(page);

@@ -635,9 +635,9 @@ impl AtPins {
         result.and(finished)?;
         let seconds = begun.elapsed().as_secs_f64();
         output::message(&format!(
-            "{written} periods of `{}` at the pins: {cycles} cycles, {:.0} a second",
+            "{written} periods of `{}` at the pins, {cycles} cycles: {:.3} ms of the board, simulated in {seconds:.1} s",
             self.interface.name,
-            cycles as f64 / seconds.max(1e-9)
+            cycles as f64 / self.clock * 1e3
         ));
         Ok(())
     }
