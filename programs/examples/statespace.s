@@ -1,8 +1,8 @@
 ; A controller in state space: 12 states, 3 measurements, 4 outputs, as
 ; linear-quadratic-Gaussian design gives it. It quiets six masses in a
-; chain of springs; statespace.csv is a record of its loop, in which a
-; mass gets a blow and later a lasting push (plant/chain.py).
-; In this folder: takt run statespace.s --inputs statespace.csv
+; chain of springs, of which one gets a blow, and later another one a
+; lasting push (design: plant/chain.py; a record: statespace.csv).
+; In this folder: takt run statespace.s --plant plant/chain.toml --periods 300
 ;
 ;   x' = A·x + B·y      u = C·x + D·y
 ;

@@ -83,7 +83,7 @@ period:
 ; stretched to N periods. With the phase φ = c1·k, which is π at a ramp's end, c1 = π·(1 + ratio)/N, the way after k periods of the first half is
 ;   s/L = A·((φ' - sin φ') + 2·(φ - φ')), φ' = min(φ, π),
 ; and A is such that s/L is 1/2 in the middle as the phase is rounded: φ = N/2·c1 there, A = 1/(2·N·c1 - 2π).
-.reg    p0x p0y p1x p1y way length ramp ratio rotation cycles nf whole:int more:int Nc:int exists:int place:int
+.reg    p0x p0y p1x p1y way length ramp ratio rotation cycles nf both asked:int whole:int more:int Nc:int exists:int place:int
         .rep i, 1, 3
         no[i] = itof(to_{i} - end[i])*um
         .endr
@@ -106,11 +106,14 @@ period:
         cycles = (1 + ratio)*(ramp*(1/Ts))
         whole = ftoi(cycles)            ; rounded up
         more = itof(whole) < cycles ? 1 : 0
-        Nc = periods == 0 ? whole + more : periods
+        asked = periods
+        Nc = asked == 0 ? whole + more : asked
         nN = place ? 0 : Nc
         nf = itof(Nc)
         nc1 = place ? 0 : (1 + ratio)*pi/nf
-        nA = place ? 0 : 1/(nf*((1 + ratio)*pi/nf)*2 - 2*pi)
+        both = nf*((1 + ratio)*pi/nf)*2 - 2*pi
+        .assume both >= 6
+        nA = place ? 0 : 1/both
         exists = length > 0             ; a move of no length vanishes
         ready = exists | place
         .rep i, 1, 5
@@ -167,10 +170,12 @@ begun:
         first = k < left
         m = first ? k : left
         phase = itof(m)*c1
+        .assume phase >= 0
         inner = min(phase, pi)
         ramps = phase < pi
         sn, cs = sin(inner), cos(inner)
         s = A*((inner - sn) + (phase - inner)*2)
+        .assume s <= 0.5
         s = first ? s : -s
         f1 = B*(1 - cs)
         f2 = ramps ? C*sn : 0

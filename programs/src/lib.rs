@@ -91,6 +91,7 @@ pub const RECORDS: &[(&str, &str)] = &[
 /// Plants that close the loops of examples: name and text of every TOML file in `examples/plant/`.
 pub const PLANTS: &[(&str, &str)] = &[
     ("cart_pendulum.toml", include_str!("../examples/plant/cart_pendulum.toml")),
+    ("chain.toml", include_str!("../examples/plant/chain.toml")),
     ("dc_motor.toml", include_str!("../examples/plant/dc_motor.toml")),
     ("pmsm.toml", include_str!("../examples/plant/pmsm.toml")),
     ("servo.toml", include_str!("../examples/plant/servo.toml")),

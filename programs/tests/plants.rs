@@ -67,6 +67,37 @@ fn a_mass_swings_as_its_spring_says() {
     near(after(text, 0.01, 60.0, &[0.0, 5.0])[0], 0.1, 1e-6);
 }
 
+/// A chain between walls swings in each of its modes as that of a string with as many masses; at rest, forces bend it in straight lines.
+#[test]
+fn a_chain_swings_in_its_modes() {
+    let (m, k) = (0.1, 40.0);
+    for mode in 1..=6 {
+        let angle = f64::from(mode) * std::f64::consts::PI / 7.0;
+        let shape: Vec<f64> = (1..=6).map(|mass| 0.01 * (f64::from(mass) * angle).sin()).collect();
+        let initial: String = (1..=6).map(|mass| format!("x{mass} = {}\n", shape[mass - 1])).collect();
+        let text = format!("model = \"chain\"\n[parameters]\nm = {m}\nk = {k}\nd = 0\n[initial]\n{initial}");
+        let rate = (k / m * (2.0 - 2.0 * angle.cos())).sqrt();
+        for seconds in [0.1, 1.0] {
+            let found = after(&text, PERIOD, seconds, &[0.0; 6]);
+            for (found, shape) in found.iter().zip(&shape) {
+                let expected = shape * (rate * seconds).cos();
+                assert!((found - expected).abs() < 1e-6 * 0.01, "mode {mode}: {found}, not {expected}");
+            }
+        }
+    }
+    // Inputs in the order of the model: forces on the masses 1, 3, 4, 6, then 2 and 5.
+    for (input, mass) in [1.0, 3.0, 4.0, 6.0, 2.0, 5.0].into_iter().enumerate() {
+        let mut inputs = [0.0; 6];
+        inputs[input] = 1.0;
+        let text = format!("model = \"chain\"\n[parameters]\nm = {m}\nk = {k}\nd = 1");
+        let found = after(&text, 0.01, 60.0, &inputs);
+        for (at, found) in (1..=6).map(f64::from).zip(found) {
+            let line = if at <= mass { at * (7.0 - mass) } else { mass * (7.0 - at) };
+            near(found, line / (7.0 * k), 1e-9);
+        }
+    }
+}
+
 #[test]
 fn a_shaft_is_driven_by_its_torque() {
     let text = "model = \"inertia\"\n[parameters]\nJ = 2e-5\nB = 1e-4";

@@ -12,6 +12,10 @@ fn program(period: &str, latched: bool) -> Program {
     let text = format!(
         "{latched}.input x, z\n.output y\n.range x = 1, 4\n.range z = -2, 2\n.once\n wait p\n.period\np:\n{period}\n wait p\n"
     );
+    assembled(&text)
+}
+
+fn assembled(text: &str) -> Program {
     let options = Options { machine: &F3, ..Options::default() };
     let assembled = assemble_bytes("test.s", text.into(), &MemoryLoader::new(&[]), &options);
     assembled.unwrap_or_else(|diagnostics| panic!("{}", diagnostics.render(false))).program
@@ -125,4 +129,24 @@ fn certificates_say_what_they_prove() {
         certify(&program(branch, true))
             .is_ok_and(|found| found.is_err() || found.is_ok_and(|found| !found.steps.is_empty()))
     );
+}
+
+/// A filter's states are kept by all periods together; a certificate has their map, and `check.py` proves that it converges.
+#[test]
+fn certificates_prove_that_states_converge() {
+    let filter = |feedback: &str| {
+        let text = format!(
+            ".schedule on\n.input x\n.output y\n.state a b\n.range x = -1, 1\n.range a, b = -12, 12\n.once\n a = 0\n b = 0\n y = 0\n wait p\n\
+             .period\np: y = x + a\n a = b + {feedback}*y\n b = -0.7*y\n wait p\n"
+        );
+        certify(&assembled(&text)).unwrap().unwrap()
+    };
+    let kept = filter("1.2");
+    assert_eq!(kept.converging.len(), 2, "{:?}", kept.open);
+    assert!(kept.converging.iter().all(|state| state.first == [0.0, 0.0]), "{:?}", kept.converging);
+    assert!(kept.open.is_empty(), "{:?}", kept.open);
+    // With its poles beyond the unit circle, or too near to it for the range, it is not proved.
+    for feedback in ["1.8", "1.69"] {
+        assert_eq!(filter(feedback).converging, [], "{feedback}");
+    }
 }

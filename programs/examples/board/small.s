@@ -58,9 +58,9 @@ sine:                                   ; a quarter of a turn more than one: the
 .endm
 .include "drive.s"
 
-; For `takt accuracy`: counts whose differences are some.
-.range  n, last = -0x20000000, 0x1fffffff
-.range  steps = -0x7fffff, 0x7fffff
+; For `takt accuracy`: a thousand turns in either direction, so that a distance has at most 24 bits and is a float without rounding.
+.range  n, last = -0x400000, 0x3fffff
+.range  steps = -0x10000, 0xffff
 .range  v = -4*VMAX, 4*VMAX
 .range  si = -IMAX, IMAX
 ; SPDX-License-Identifier: MIT OR Apache-2.0

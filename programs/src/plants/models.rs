@@ -4,14 +4,28 @@
 use super::inverter::{self, Leg};
 use super::{Input, Model, Parameter, Quantity};
 
-/// Number of state variables of the largest model; smaller ones leave the last at 0.
-pub(super) const ORDER: usize = 4;
+/// Number of state variables of the largest model; smaller ones leave the others at 0.
+pub(super) const ORDER: usize = 12;
 /// State variables.
 pub(super) type State = [f64; ORDER];
 
+/// State with these first variables.
+fn state<const N: usize>(variables: [f64; N]) -> State {
+    std::array::from_fn(|at| variables.get(at).copied().unwrap_or_default())
+}
+
 /// All models.
-pub static MODELS: [&Model; 8] =
-    [&DC_MOTOR, &DC_MOTOR_SWITCHED, &PMSM, &PMSM_SWITCHED, &INERTIA, &MASS_SPRING, &CART_PENDULUM, &TANK];
+pub static MODELS: [&Model; 9] = [
+    &DC_MOTOR,
+    &DC_MOTOR_SWITCHED,
+    &PMSM,
+    &PMSM_SWITCHED,
+    &INERTIA,
+    &MASS_SPRING,
+    &CHAIN,
+    &CART_PENDULUM,
+    &TANK,
+];
 
 const fn positive(name: &'static str, value: f64, unit: &'static str, text: &'static str) -> Parameter {
     Parameter { name, value, unit, text, least: f64::MIN_POSITIVE }
@@ -63,9 +77,9 @@ static DC_MOTOR: Model = Model {
     parameters: &DC_MOTOR_PARAMETERS,
     derivative: |p, input, [current, speed, ..]| {
         let (&[r, l, k, j, b], &[u, load]) = (p, input) else { return [0.0; ORDER] };
-        [(u - r * current - k * speed) / l, (k * current - b * speed - load) / j, speed, 0.0]
+        state([(u - r * current - k * speed) / l, (k * current - b * speed - load) / j, speed])
     },
-    sense: |_, [current, speed, angle, _]| vec![speed, current, angle],
+    sense: |_, [current, speed, angle, ..]| vec![speed, current, angle],
     rate: |p, _| {
         let [r, l, k, j, b] = *p else { return 0.0 };
         r / l + b / j + k / (l * j).sqrt()
@@ -96,7 +110,7 @@ static DC_MOTOR_SWITCHED: Model = Model {
         let [a, behind] = [(a_level, a_loss, current), (b_level, b_loss, -current)]
             .map(|(level, loss, current)| Leg { level, loss }.voltage(current, knee));
         let u = (a - behind) * udc;
-        [(u - r * current - k * speed) / l, (k * current - b * speed - load) / j, speed, 0.0]
+        state([(u - r * current - k * speed) / l, (k * current - b * speed - load) / j, speed])
     },
     rate: |p, _| {
         let [r, l, k, j, b, udc, _, knee] = *p else { return 0.0 };
@@ -209,10 +223,10 @@ fn pmsm_torque(p: &[f64], [id, iq, ..]: State) -> f64 {
 }
 
 /// Ld·did/dt = ud - R·id + we·Lq·iq, Lq·diq/dt = uq - R·iq - we·(Ld·id + psi), J·dw/dt = torque - B·w - load.
-fn pmsm(p: &[f64], input: &[f64], state: State) -> State {
+fn pmsm(p: &[f64], input: &[f64], at: State) -> State {
     let [r, ld, lq, psi, pairs, j, b, udc, _, knee] = *p else { return [0.0; ORDER] };
-    let (sine, cosine) = electrical(p, state);
-    let currents = phase_currents(p, state);
+    let (sine, cosine) = electrical(p, at);
+    let currents = phase_currents(p, at);
     let voltage = |phase: usize| {
         let leg = Leg { level: input[2 * phase], loss: input[2 * phase + 1] };
         leg.voltage(currents[phase], knee) * udc
@@ -222,15 +236,15 @@ fn pmsm(p: &[f64], input: &[f64], state: State) -> State {
     let alpha = (2.0 * a - b_phase - c) / 3.0;
     let beta = (b_phase - c) / (2.0 * HALF_ROOT);
     let (ud, uq) = (alpha * cosine + beta * sine, beta * cosine - alpha * sine);
-    let [id, iq, speed, _] = state;
+    let [id, iq, speed, ..] = at;
     let we = pairs * speed;
     let load = input[6];
-    [
+    state([
         (ud - r * id + we * lq * iq) / ld,
         (uq - r * iq - we * (ld * id + psi)) / lq,
-        (pmsm_torque(p, state) - b * speed - load) / j,
+        (pmsm_torque(p, at) - b * speed - load) / j,
         speed,
-    ]
+    ])
 }
 
 fn pmsm_sensors(p: &[f64], state: State) -> Vec<f64> {
@@ -258,7 +272,7 @@ static INERTIA: Model = Model {
     parameters: &[positive("J", 2e-5, "kg·m²", "moment of inertia, with the load's"), FRICTION],
     derivative: |p, input, [speed, ..]| {
         let (&[j, b], &[torque, load]) = (p, input) else { return [0.0; ORDER] };
-        [(torque - b * speed - load) / j, speed, 0.0, 0.0]
+        state([(torque - b * speed - load) / j, speed])
     },
     sense: |_, [speed, angle, ..]| vec![angle, speed],
     rate: |p, _| p[1] / p[0],
@@ -283,10 +297,71 @@ static MASS_SPRING: Model = Model {
     ],
     derivative: |p, input, [x, v, ..]| {
         let (&[m, k, d], &[force, push]) = (p, input) else { return [0.0; ORDER] };
-        [v, (force + push - k * x - d * v) / m, 0.0, 0.0]
+        state([v, (force + push - k * x - d * v) / m])
     },
     sense: |_, [x, v, ..]| vec![x, v],
     rate: |p, _| p[2] / p[0] + (p[1] / p[0]).sqrt(),
+    stretches: None,
+    bridge: None,
+};
+
+/// Number of masses of the chain.
+const MASSES: usize = 6;
+const POSITION: &str = "position, 0 at rest";
+
+/// Masses between walls, with springs of one stiffness: m·dv/dt = k·(left + right - 2·x) - d·v + force.
+static CHAIN: Model = Model {
+    name: "chain",
+    text: "six masses in a chain of springs",
+    inputs: &[
+        actuator("f1", "N", "force on mass 1"),
+        actuator("f3", "N", "force on mass 3"),
+        actuator("f4", "N", "force on mass 4"),
+        actuator("f6", "N", "force on mass 6"),
+        disturbance("blow", "N", "force on mass 2"),
+        disturbance("push", "N", "force on mass 5"),
+    ],
+    sensors: &[
+        quantity("x1", "m", POSITION),
+        quantity("x2", "m", POSITION),
+        quantity("x3", "m", POSITION),
+        quantity("x4", "m", POSITION),
+        quantity("x5", "m", POSITION),
+        quantity("x6", "m", POSITION),
+    ],
+    states: &[
+        quantity("x1", "m", POSITION),
+        quantity("x2", "m", POSITION),
+        quantity("x3", "m", POSITION),
+        quantity("x4", "m", POSITION),
+        quantity("x5", "m", POSITION),
+        quantity("x6", "m", POSITION),
+        quantity("v1", "m/s", "velocity"),
+        quantity("v2", "m/s", "velocity"),
+        quantity("v3", "m/s", "velocity"),
+        quantity("v4", "m/s", "velocity"),
+        quantity("v5", "m/s", "velocity"),
+        quantity("v6", "m/s", "velocity"),
+    ],
+    parameters: &[
+        positive("m", 0.1, "kg", "each mass"),
+        natural("k", 40.0, "N/m", "stiffness of each spring"),
+        natural("d", 0.02, "N·s/m", "damping of each mass"),
+    ],
+    derivative: |p, input, at| {
+        let (&[m, k, d], &[f1, f3, f4, f6, blow, push]) = (p, input) else { return [0.0; ORDER] };
+        let force = [f1, blow, f3, f4, push, f6];
+        let position = |mass: usize| if mass < MASSES { at[mass] } else { 0.0 };
+        std::array::from_fn(|variable| match variable.checked_sub(MASSES) {
+            None => at[variable + MASSES],
+            Some(mass) => {
+                let beside = position(mass.wrapping_sub(1)) + position(mass + 1);
+                (k * (beside - 2.0 * at[mass]) - d * at[variable] + force[mass]) / m
+            }
+        })
+    },
+    sense: |_, at| at[..MASSES].to_vec(),
+    rate: |p, _| p[2] / p[0] + 2.0 * (p[1] / p[0]).sqrt(),
     stretches: None,
     bridge: None,
 };
@@ -322,16 +397,16 @@ static CART_PENDULUM: Model = Model {
         natural("b", 0.1, "N·s/m", "friction of the cart"),
         natural("c", 1e-3, "N·m·s/rad", "friction of the joint"),
     ],
-    derivative: |p, input, [_, v, angle, rate]| {
+    derivative: |p, input, [_, v, angle, rate, ..]| {
         let (&[cart, mass, length, b, c], &[force, push]) = (p, input) else { return [0.0; ORDER] };
         let (sine, cosine) = libm::sincos(angle);
         let joint = c * rate / length;
         let inner = mass * sine * (length * rate * rate - GRAVITY * cosine);
         let acceleration = (force + push - b * v + inner + joint * cosine) / (cart + mass * sine * sine);
         let turning = (GRAVITY * sine - acceleration * cosine - joint / mass) / length;
-        [v, acceleration, rate, turning]
+        state([v, acceleration, rate, turning])
     },
-    sense: |_, state| state.to_vec(),
+    sense: |_, [x, v, angle, rate, ..]| vec![x, v, angle, rate],
     rate: |p, _| {
         let [cart, mass, length, b, c] = *p else { return 0.0 };
         b / cart + c / (mass * length * length) + (GRAVITY / length * (cart + mass) / cart).sqrt()
@@ -366,7 +441,7 @@ static TANK: Model = Model {
         } else {
             flow
         };
-        [held / area, 0.0, 0.0, 0.0]
+        state([held / area])
     },
     sense: |p, [h, ..]| vec![h.clamp(0.0, p[2])],
     // The outlet's time constant at a hundredth of the height.

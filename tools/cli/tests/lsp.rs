@@ -646,6 +646,12 @@ fn completion_offers_valid_operands() {
         &["p2", "x", "K", "sqrt", "pi"],
         &["i", "period", "tmp", "fadd"],
     );
+    // Functions of equations; others are of constants only, and say so.
+    has(
+        &labels("fadd    F, p1, p2\n", "F = s\n"),
+        &["sat", "sign", "sum", "scale", "sqrt", "tan"],
+        &["fadd"],
+    );
     // An instruction that there is not may be a macro yet to be written.
     has(&labels("fadd    F, p1, p2\n", "fadx    F, p\n"), &["p1", "p2", "x", "K", "sqrt"], &["fadd"]);
     has(&labels("p{i}, 2\n", "p{i}, \n"), &["i", "p2", "K"], &["fadd"]);
@@ -996,7 +1002,10 @@ fn operands_are_shown_in_their_order() {
     assert_eq!(told("fadd    F, p1, p2", "fadd    F, p1, "), "fadd d, a, b | b");
     assert_eq!(told("fadd    F, p1, p2", "fadd "), "fadd d, a, b | d");
     assert_eq!(told("scale   p{i}, 2", "scale   p{i}, "), "scale to, by | by");
-    assert_eq!(told("fadd    F, p1, p2", "F = p1 + max(p2, "), "max(a, …) | …");
+    assert_eq!(told("fadd    F, p1, p2", "F = p1 + max(p2, "), "max(a, b) | b");
+    assert_eq!(told("fadd    F, p1, p2", "F = sat(p1, "), "sat(a, b) | b");
+    assert_eq!(told("fadd    F, p1, p2", "F = sum(k, 1, "), "sum(i, first, last, part) | last");
+    assert_eq!(told(".rep i, 1, 3", ".rep i, max(1, "), "max(a, …) | …");
     assert_eq!(told("fadd    F, p1, p2", "F = p1 + sqrt(max(p2, 1) + "), "sqrt(a) | a");
     assert!(told(".rep i, 1, 3", ".rep i, ").starts_with(".rep "));
     assert_eq!(told("fadd    F, p1, p2", "fadd"), "", "before a blank, completion helps");

@@ -20,8 +20,9 @@ const PROGRAMS: [(&str, usize); 5] = [
     ("examples/statespace.s", 4),
     ("examples/biquads.s", 1),
 ];
-/// Program whose certificate gets the mistakes.
+/// Program whose certificate gets the mistakes, and one with states that only all periods together keep.
 const TAMPERED: &str = "examples/foc.s";
+const CONVERGING: &str = "examples/biquads.s";
 
 /// A mistake, planted into a certificate or its goals.
 type Mistake = (&'static str, fn(&mut Certificate, &mut Vec<(String, String)>));
@@ -57,8 +58,9 @@ pub(crate) fn check() -> Result<()> {
         ensure!(accepted, "{name}: {text}");
         println!("{name}\n{text}");
     }
-    for (mistake, plant) in MISTAKES {
-        let mut certificate = certificate(TAMPERED)?;
+    let of_states = MISTAKES_OF_STATES.into_iter().map(|mistake| (CONVERGING, mistake));
+    for (name, (mistake, plant)) in MISTAKES.into_iter().map(|mistake| (TAMPERED, mistake)).chain(of_states) {
+        let mut certificate = certificate(name)?;
         let (sound, mut goals) = (certificate.files(), certificate.files().split_off(2));
         plant(&mut certificate, &mut goals);
         let mut files = certificate.files();
@@ -163,4 +165,24 @@ const MISTAKES: [Mistake; 20] = [
         let (_, text) = goals.last_mut().expect("a goal");
         *text = text.replace("-> r in", "-> r - r in");
     }),
+];
+
+/// Mistakes in the proof that states converge.
+const MISTAKES_OF_STATES: [Mistake; 4] = [
+    ("states may begin anywhere in their ranges", |c, _| {
+        for state in &mut c.converging {
+            state.first = c.promises[state.promise].range;
+        }
+    }),
+    ("the states' ranges are an eighth", |c, _| {
+        for state in &c.converging {
+            c.promises[state.promise].range = c.promises[state.promise].range.map(|end| end / 8.0);
+        }
+    }),
+    ("a state never changes", |c, _| {
+        let promise = Some(c.converging[0].promise);
+        let begins = c.steps.iter().position(|step| step.promise == promise);
+        c.converging[0].step = begins.expect("it is read");
+    }),
+    ("a state occurs twice", |c, _| c.converging[1] = c.converging[0].clone()),
 ];

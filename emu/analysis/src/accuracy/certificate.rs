@@ -6,12 +6,13 @@
 //! says which one it proves. All numbers are binary64, and the checker reads each as the rational number that it is.
 
 use super::affine::Affine;
+use super::converge::Linear;
 use super::enclose::Explorer;
 use super::interval::Interval;
 use super::node::{Made, Meaning, Node};
 use super::number::{INTEGERS, power};
 use super::rounding::{self, is_power};
-use super::states::Place;
+use super::states::{MAX_LINEAR, Place};
 use super::value::{SMALLEST_NORMAL, Value};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -20,6 +21,9 @@ use takt_isa::{Program, Type};
 
 /// Checker that goes with every certificate.
 const CHECK: &str = include_str!("check.py");
+
+/// Part of a state's range that a linear map must leave free, so that the checker's arithmetic finds the same.
+const SURE: f64 = 1.0 - 1e-9;
 
 /// Rules that goals for Gappa spell out; values of others are variables.
 const IN_EXPRESSIONS: [&str; 6] = ["add", "mul", "div", "neg", "sqrt", "steep"];
@@ -35,6 +39,8 @@ pub struct Certificate {
     pub outputs: Vec<Proved>,
     /// States that a period leaves in their promised range, by this derivation.
     pub kept: Vec<Kept>,
+    /// States that no single period keeps, and all periods together do: their linear map converges.
+    pub converging: Vec<Convergent>,
     /// Promises about states that the derivation relies on without proving them, and outputs that it does not reach, with the reasons.
     pub open: Vec<Open>,
 }
@@ -117,6 +123,45 @@ pub struct Kept {
     pub promise: usize,
     /// Step of its value at the end of the period.
     pub step: usize,
+}
+
+/// State of a linear map that converges.
+#[derive(Serialize, Clone, Debug, PartialEq)]
+pub struct Convergent {
+    /// Index of its promise.
+    pub promise: usize,
+    /// Step of its value at the end of the period.
+    pub step: usize,
+    /// Its range when the first period begins.
+    pub first: [f64; 2],
+}
+
+/// Value of the run as a sum of states' multiples and a rest.
+#[derive(Clone)]
+struct Sum {
+    /// Factors by the states' promises.
+    terms: BTreeMap<usize, Interval>,
+    rest: Interval,
+}
+
+impl Sum {
+    fn of(rest: Interval) -> Sum {
+        Sum { terms: BTreeMap::new(), rest }
+    }
+
+    fn times(&self, factor: Interval) -> Sum {
+        let terms = self.terms.iter().map(|(state, by)| (*state, factor * *by)).collect();
+        Sum { terms, rest: factor * self.rest }
+    }
+
+    fn plus(mut self, other: &Sum) -> Sum {
+        for (state, by) in &other.terms {
+            let known = self.terms.entry(*state).or_insert(Interval::ZERO);
+            *known = *known + *by;
+        }
+        self.rest = self.rest + other.rest;
+        self
+    }
 }
 
 /// Part of the statement that the derivation does not reach.
@@ -294,6 +339,8 @@ pub(super) fn derive(explorer: &Explorer<'_>, finals: &[(u32, Place, Rc<Node>)])
         builder.entering.insert(*symbol, promise);
     }
     let (mut outputs, mut kept, mut open) = (Vec::new(), Vec::new(), Vec::new());
+    // States with their values at the end of the period, and those of them that it may leave.
+    let (mut states, mut left) = (Vec::new(), BTreeMap::new());
     for (period, place, node) in finals {
         let is_output = match place {
             Place::Register(register) => {
@@ -310,14 +357,12 @@ pub(super) fn derive(explorer: &Explorer<'_>, finals: &[(u32, Place, Rc<Node>)])
             Ok(known) => {
                 if let Some(promise) = promised.get(place) {
                     let [low, high] = builder.promises[*promise].range;
+                    let first = explorer.first_value(*place).and_then(|value| value.float().ok());
+                    let first = first.map_or([low, high], |number| ends(number.actual));
+                    states.push(Convergent { promise: *promise, step: known.place, first });
                     match known.run.within(Interval::new(low, high)) {
                         true => kept.push(Kept { promise: *promise, step: known.place }),
-                        false => open.push(Open {
-                            name: name.clone(),
-                            reason: format!(
-                                "its range [{low}, {high}] is assumed: by itself, a period may leave it"
-                            ),
-                        }),
+                        false => _ = left.insert(*promise, name.clone()),
                     }
                 }
                 if is_output {
@@ -327,7 +372,18 @@ pub(super) fn derive(explorer: &Explorer<'_>, finals: &[(u32, Place, Rc<Node>)])
             }
         }
     }
-    Certificate { promises: builder.promises, steps: builder.steps, outputs, kept, open }
+    let converging = match explorer.periods {
+        1 => builder.converging(&states, &left),
+        // With several periods, each has its own values of the states.
+        _ => Vec::new(),
+    };
+    left.retain(|promise, _| converging.iter().all(|state| state.promise != *promise));
+    for (promise, name) in left {
+        let [low, high] = builder.promises[promise].range;
+        let reason = format!("its range [{low}, {high}] is assumed: by itself, a period may leave it");
+        open.push(Open { name, reason });
+    }
+    Certificate { promises: builder.promises, steps: builder.steps, outputs, kept, converging, open }
 }
 
 impl Builder<'_> {
@@ -467,6 +523,87 @@ impl Builder<'_> {
         }
         let (_, by) = scaled_by(&self.steps, value.place)?;
         Some(rounding::of_scaled(Interval::point(by), value.run))
+    }
+
+    /// States whose linear map keeps all of them in their ranges for all time, those that a period may leave among them.
+    fn converging(&self, states: &[Convergent], left: &BTreeMap<usize, String>) -> Vec<Convergent> {
+        if left.is_empty() {
+            return Vec::new();
+        }
+        // A state that each period keeps may converge with the others, or not (a limited integrator): try with and without these.
+        let floats = states.iter().filter(|state| !self.promises[state.promise].integer);
+        let all: Vec<Convergent> = floats.cloned().collect();
+        let open: Vec<Convergent> =
+            all.iter().filter(|state| left.contains_key(&state.promise)).cloned().collect();
+        let tried = [all, open].into_iter().filter(|states| states.len() <= MAX_LINEAR);
+        let mut kept = tried.filter(|states| {
+            let largest = self.linear(states).and_then(|linear| linear.largest());
+            largest.is_some_and(|largest| largest.iter().all(|most| *most < SURE))
+        });
+        kept.next().unwrap_or_default()
+    }
+
+    /// Linear map of the period on states, as the checker finds it.
+    fn linear(&self, states: &[Convergent]) -> Option<Linear> {
+        let order: Vec<usize> = states.iter().map(|state| state.promise).collect();
+        let sums = self.sums(&order);
+        let range = |promise: usize| {
+            let [low, high] = self.promises[promise].range;
+            Interval::new(low, high)
+        };
+        let mut linear = Linear { rows: Vec::new(), added: Vec::new(), first: Vec::new() };
+        for state in states {
+            let sum = &sums[state.step];
+            let (middle, radius) =
+                (Interval::point(range(state.promise).middle()), range(state.promise).radius());
+            if radius <= 0.0 {
+                return None;
+            }
+            let radius = Interval::point(radius);
+            let factor = |promise: &usize| sum.terms.get(promise).copied().unwrap_or(Interval::ZERO);
+            let scaled =
+                |promise: &usize| factor(promise) * Interval::point(range(*promise).radius()) / radius;
+            let middles =
+                order.iter().map(|promise| factor(promise) * Interval::point(range(*promise).middle()));
+            let offset = middles.fold(-middle, |sum, term| sum + term);
+            linear.rows.push(order.iter().map(scaled).collect());
+            linear.added.push(((sum.rest + offset).abs() / radius).high);
+            let [low, high] = state.first;
+            linear.first.push(((Interval::new(low, high) - middle).abs() / radius).high);
+        }
+        Some(linear)
+    }
+
+    /// Each step's value in the run as a sum of states, as far as the steps are linear in them.
+    fn sums(&self, states: &[usize]) -> Vec<Sum> {
+        let mut sums: Vec<Sum> = Vec::with_capacity(self.steps.len());
+        for step in &self.steps {
+            let run = |place: usize| {
+                let [low, high] = self.steps[place].run;
+                Interval::new(low, high)
+            };
+            let point = |index: usize| run(step.of[index]).low == run(step.of[index]).high;
+            let of = |index: usize| &sums[step.of[index]];
+            let value = match step.rule {
+                "promise" if step.promise.is_some_and(|promise| states.contains(&promise)) => {
+                    let terms = step.promise.map(|promise| (promise, Interval::point(1.0)));
+                    Sum { terms: terms.into_iter().collect(), rest: Interval::ZERO }
+                }
+                "neg" => of(0).times(Interval::point(-1.0)),
+                "add" => of(0).clone().plus(of(1)),
+                "mul" if point(0) => of(1).times(run(step.of[0])),
+                "mul" if point(1) => of(0).times(run(step.of[1])),
+                "round" => {
+                    let bound = step.rounding.as_ref().map_or(0.0, |rounding| rounding.bound);
+                    of(0).clone().plus(&Sum::of(Interval::new(-bound, bound)))
+                }
+                "cap" | "integer" => of(0).clone(),
+                _ => Sum::of(Interval::ZERO),
+            };
+            let [low, high] = step.run;
+            sums.push(if value.terms.is_empty() { Sum::of(Interval::new(low, high)) } else { value });
+        }
+        sums
     }
 
     /// Replaces an error by the distance of both ranges, where that is narrower.

@@ -222,6 +222,99 @@ class Checker:
         return "\n".join(lines) + "\n"
 
 
+# Binary digits of the powers of a matrix.
+DIGITS = 400
+
+
+class Matrix:
+    """Elements in units of 2^-DIGITS, each to within `error` of these units."""
+
+    def __init__(self, rows, error):
+        self.rows, self.error = rows, error
+
+    def __mul__(self, other):
+        columns = list(zip(*other.rows))
+        size, unit = len(columns), 2**DIGITS
+        rows = [[sum(map(int.__mul__, row, column)) // unit for column in columns] for row in self.rows]
+        wide = max(sum(map(abs, row)) for row in self.rows) * other.error + max(sum(map(abs, column)) for column in columns) * self.error
+        return Matrix(rows, (wide + size * self.error * other.error) // unit + 2)
+
+    def most(self, row, by):
+        """Largest magnitude of a row's product with numbers of these magnitudes."""
+        return sum((abs(element) + self.error) * value for element, value in zip(self.rows[row], by)) / 2**DIGITS
+
+
+class Sum:
+    """A value of the run: factors of states, and the range of the rest."""
+
+    def __init__(self, terms, rest):
+        self.terms, self.rest = terms, rest
+
+    def times(self, factor):
+        return Sum({state: factor * by for state, by in self.terms.items()}, product((factor, factor), self.rest))
+
+    def plus(self, other):
+        terms = {state: self.terms.get(state, 0) + other.terms.get(state, 0) for state in {**self.terms, **other.terms}}
+        return Sum(terms, (self.rest[0] + other.rest[0], self.rest[1] + other.rest[1]))
+
+
+def sums(steps, states):
+    """Each step's value in the run as a sum of states, as far as the steps are linear in them."""
+    found = []
+    for step in steps:
+        of, rule = [found[place] for place in step["of"]], step["rule"]
+        point = lambda index: steps[step["of"][index]]["run"][0] == steps[step["of"][index]]["run"][1]
+        if rule == "promise" and step["promise"] in states:
+            value = Sum({step["promise"]: Q(1)}, (Q(0), Q(0)))
+        elif rule == "neg":
+            value = of[0].times(Q(-1))
+        elif rule == "add":
+            value = of[0].plus(of[1])
+        elif rule == "mul" and (point(0) or point(1)):
+            one, other = (0, 1) if point(0) else (1, 0)
+            value = of[other].times(steps[step["of"][one]]["run"][0])
+        elif rule == "round":
+            bound = Q(step["rounding"]["bound"])
+            value = of[0].plus(Sum({}, (-bound, bound)))
+        elif rule in ("cap", "integer"):
+            value = of[0]
+        else:
+            value = Sum({}, step["run"])
+        found.append(value if value.terms else Sum({}, step["run"]))
+    return found
+
+
+def converges(checker, states):
+    """The states' linear map keeps all of them in their ranges for all time: the sum of its powers' magnitudes is small enough."""
+    order = [state["promise"] for state in states]
+    need(len(set(order)) == len(order), "a state twice")
+    found = sums(checker.steps, set(order))
+    scale = {promise: middle(checker.promises[promise][1]) for promise in order}
+    rows, added, first = [], [], []
+    for state in states:
+        value, (center, radius) = found[state["step"]], scale[state["promise"]]
+        need(radius > 0, "a state without a range")
+        rows.append([value.terms.get(promise, Q(0)) * scale[promise][1] / radius for promise in order])
+        offset = sum(factor * scale[promise][0] for promise, factor in value.terms.items()) - center
+        added.append(max(abs(end + offset) for end in value.rest) / radius)
+        first.append(max(abs(end - center) for end in pair(state["first"])) / radius)
+    unit = 2**DIGITS
+    step = Matrix([[int(element * unit) for element in row] for row in rows], 1)
+    powers = [Matrix([[unit * (i == j) for j in range(len(order))] for i in range(len(order))], 0)]
+    # Doubling: the powers' errors stay as small as their norms.
+    norm = lambda: max(step.most(row, [Q(1)] * len(order)) for row in range(len(order)))
+    while norm() > Q(1, 1024):
+        need(len(powers) < 2**14 and norm() < 10**9, "the states' linear map does not converge")
+        powers += [step * power for power in powers]
+        step = step * step
+    rest = norm()
+    total = [sum(power.most(row, added) for power in powers) for row in range(len(order))]
+    left = [max(power.most(row, first) for power in powers) for row in range(len(order))]
+    beyond = max(total) * rest / (1 - rest) + max(left) * rest
+    for row, promise in enumerate(order):
+        need(total[row] + left[row] + beyond <= 1, f"the range of {checker.promises[promise][0]} over all periods")
+
+
 def main():
     data = json.loads((HERE / "certificate.json").read_text())
     checker = Checker(data)
@@ -230,9 +323,17 @@ def main():
     for kept in data["kept"]:
         name, promised = checker.promises[kept["promise"]]
         need(within(checker.steps[kept["step"]]["run"], promised), f"the range of {name}")
+    if data["converging"]:
+        converges(checker, data["converging"])
     print(f"{len(checker.steps)} steps and {checker.goals} goals of Gappa hold")
     for output in data["outputs"]:
         print(f"  {output['name']}: the error is at most {output['bound']:.4g}")
+    names = [checker.promises[state["promise"]][0] for state in data["converging"]]
+    if names:
+        print(f"  always in their ranges, as their linear map converges: {', '.join(names)}")
+    for name, state in zip(names, data["converging"]):
+        low, high = state["first"]
+        checker.hypotheses.append(f"{name} is in [{low}, {high}] when the first period begins")
     for text in checker.hypotheses:
         print(f"  hypothesis: {text}")
     for item in data["open"]:

@@ -2,12 +2,14 @@
 //! Operations on abstract values: results, their rounding, hazards.
 
 use super::affine::Affine;
+use super::assume::View;
 use super::bits;
 use super::enclose::Explorer;
 use super::interval::Interval;
 use super::node::{Made, Meaning, Node};
 use super::number::{Number, Problem, float_grid};
 use super::operand::Operand;
+use super::refine::MAX_NESTED;
 use super::relation::{self, Limit};
 use super::relative::Relative;
 use super::rounding::{self, is_power};
@@ -20,6 +22,8 @@ use takt_isa::{Instruction, Register, Type, compute, real};
 
 /// Factor by which a relation must narrow an error, or a range, to replace terms that are correlated with other values.
 const WORTH: f64 = 1.25;
+/// The same for an operand's error within a limit.
+const WORTH_TERMS: f64 = 4.0;
 
 impl Explorer<'_> {
     /// Result of an operation. A copy, a decided selection and a limit that is not reached return the operand's node, since they are the
@@ -67,6 +71,9 @@ impl Explorer<'_> {
         let limit = limit.filter(|_| matches!(problem, None | Some(Problem::Overflow))).filter(is_number);
         if let Some(limit) = limit {
             (value, problem) = (self.limited(*word, &value, &limit), None);
+        }
+        if let Some(range) = meaning.as_ref().and_then(|meaning| relation::open(meaning, operands)) {
+            value = self.clamped(*word, value, range);
         }
         let broken = value == Value::Broken;
         let mut node = Node::new(value, made.clone());
@@ -123,6 +130,33 @@ impl Explorer<'_> {
         if number.form.radius() > WORTH * exact.radius() {
             number.form = Affine::of(exact, self.symbol(None));
         }
+        Value::Float(Rc::new(number.capped(|error| self.symbol_of(error, word))))
+    }
+
+    /// Result of a limit by a constant: its error is at most that of the operand where the limit does not give the result, in the run or
+    /// exactly.
+    fn clamped(&mut self, word: u32, value: Value, (operand, open): (Rc<Node>, Interval)) -> Value {
+        let (Value::Float(number), Ok(inside)) = (&value, operand.value.float()) else { return value };
+        let error = number.error_range().magnitude();
+        let near = open.widened(inside.error_range().magnitude());
+        if error == 0.0 || inside.actual.within(near) || self.nested >= MAX_NESTED {
+            return value;
+        }
+        self.nested += 1;
+        let scene = self.scene(|context| context.narrow(&operand, near, View::Float));
+        let under = scene.map(|mut scene| self.under(&operand, &mut scene));
+        self.nested -= 1;
+        // Without a scene, the limit gives the result in every run.
+        let left = match under.map(|node| node.value.float()) {
+            Some(Ok(inside)) => inside.error_range().hull(Interval::ZERO),
+            Some(Err(_)) => return value,
+            None => Interval::ZERO,
+        };
+        if WORTH_TERMS * left.magnitude() >= error {
+            return value;
+        }
+        let error = Affine::of(left, self.symbol_of(&number.error, word));
+        let number = Number { error, relative: None, ..Number::clone(number) };
         Value::Float(Rc::new(number.capped(|error| self.symbol_of(error, word))))
     }
 

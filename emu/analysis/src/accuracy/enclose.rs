@@ -790,6 +790,12 @@ impl Explorer<'_> {
                 let value = state.registers.get(register).map_or(&Value::Unknown, |node| &node.value);
                 join_into(&mut self.left_by_once, *register, value);
             }
+            // How states begin the first period.
+            let registers =
+                state.registers.iter().map(|(register, node)| (Place::Register(*register), &node.value));
+            let words = state.memory.iter().map(|(word, node)| (Place::Word(*word), &node.value));
+            let left = registers.chain(words).map(|(place, value)| (place, value.clone()));
+            self.found.left.extend(left);
             return;
         }
         let program = self.program;

@@ -16,7 +16,7 @@ use std::rc::Rc;
 use takt_isa::fp::Bitwise;
 
 /// Limit on selections whose conditions are assumed within each other.
-const MAX_NESTED: u32 = 3;
+pub(super) const MAX_NESTED: u32 = 3;
 /// Limit on the cases that are distinguished for a result, as a power of two.
 const MAX_CASES: u32 = 6;
 /// Limit on the divisions of a range.

@@ -47,6 +47,29 @@ pub(super) fn limit(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> Option<Limit
         .or_else(|| Rotation::of(meaning, operands)?.limit())
 }
 
+/// Operand of a limit by a constant, and where the limit does not give the result.
+pub(super) fn open(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> Option<(Rc<Node>, Interval)> {
+    let limit = |node: &Rc<Node>| {
+        let range = node.value.float().ok()?.actual;
+        (range.low == range.high && node.value.float().is_ok_and(|number| number.error.is_zero()))
+            .then_some(range.low)
+    };
+    let either = |of: &[Meaning; 2]| {
+        let (a, b) = (source(&of[0], operands)?, source(&of[1], operands)?);
+        let found = limit(b).map(|at| (a, at)).or_else(|| limit(a).map(|at| (b, at)))?;
+        Some((Rc::clone(found.0), found.1))
+    };
+    match meaning {
+        Meaning::Minimum(of) => either(of).map(|(node, at)| (node, Interval::new(f64::NEG_INFINITY, at))),
+        Meaning::Maximum(of) => either(of).map(|(node, at)| (node, Interval::new(at, f64::INFINITY))),
+        Meaning::Saturate(of) => {
+            let (node, at) = (source(&of[0], operands)?, limit(source(&of[1], operands)?)?.abs());
+            Some((Rc::clone(node), Interval::new(-at, at)))
+        }
+        _ => None,
+    }
+}
+
 /// Limit on the magnitude of a component over its norm.
 ///
 /// In the run the quotient of a component and its norm is at most 1, too: the square root of a rounded square is the number itself (Boldo,

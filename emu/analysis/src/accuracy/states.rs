@@ -12,7 +12,7 @@ use takt_isa::program::{ArrayRange, Range};
 use takt_isa::{Register, Type};
 
 /// Limit on the states whose linear map is examined.
-const MAX_LINEAR: usize = 64;
+pub(super) const MAX_LINEAR: usize = 64;
 
 /// Location of a value that outlives a bundle.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -160,7 +160,7 @@ impl Explorer<'_> {
     }
 
     /// Value of a state when the first period begins.
-    fn first_value(&self, place: Place) -> Option<Value> {
+    pub(super) fn first_value(&self, place: Place) -> Option<Value> {
         let loaded = match place {
             Place::Register(_) => None,
             Place::Word(word) => Some(self.program.data.get(word as usize).copied().unwrap_or(0)),

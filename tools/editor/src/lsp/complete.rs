@@ -2,7 +2,7 @@
 //! Completion at a position.
 
 use crate::lsp::program::{File, Front};
-use crate::lsp::{Settings, hover, names};
+use crate::lsp::{Settings, functions, hover, names};
 use lsp_types::{
     CompletionItem, CompletionItemKind, CompletionTextEdit, Documentation, InsertTextFormat, MarkupContent,
     MarkupKind, Range, TextEdit,
@@ -141,9 +141,9 @@ pub(crate) fn complete(
     // Index of the operand that contains the cursor.
     let number = operands.iter().filter(|token| token.kind == TokenKind::Comma).count();
     let Some(op) = Op::from_mnemonic(word(head)) else {
-        // A macro accepts arguments of any kind.
+        // An equation, or a macro's arguments, which may be equations.
         let mut items = named(&wanted, front, file, byte, &ANY);
-        items.extend(functions(&wanted));
+        items.extend(of_equations(&wanted, front));
         return items;
     };
     let brackets = operands.iter().any(|token| word(token) == "[");
@@ -297,11 +297,43 @@ fn named(
 fn values(wanted: &CompletionOptions<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
     let kinds = [SymbolKind::Constant, SymbolKind::Data, SymbolKind::Parameter, SymbolKind::Count];
     let mut items = named(wanted, front, file, byte, &kinds);
-    items.extend(functions(wanted));
+    items.extend(of_constants(wanted));
     items
 }
 
-fn functions(wanted: &CompletionOptions<'_>) -> Vec<CompletionItem> {
+/// Functions and macros of equations, then those that take constants only.
+fn of_equations(wanted: &CompletionOptions<'_>, front: &Front) -> Vec<CompletionItem> {
+    let call = |name: &str, kind: CompletionItemKind, arguments: &str, text: &str| {
+        let detail = format!("{name}({arguments}){text}");
+        wanted.item(name, kind, detail, format!("{name}("))
+    };
+    let own = functions::all(wanted.machine);
+    let mut items: Vec<CompletionItem> = own
+        .iter()
+        .map(|function| {
+            let text = format!(": {}", function.text);
+            call(function.name, CompletionItemKind::FUNCTION, &function.arguments.join(", "), &text)
+        })
+        .collect();
+    let macros = front.index.symbols.iter().filter(|symbol| symbol.kind == SymbolKind::Macro);
+    // The first parameter is the result.
+    items.extend(macros.filter_map(|symbol| {
+        let (_, arguments) = symbol.parameters.split_first()?;
+        Some(call(&symbol.name, CompletionItemKind::MODULE, &arguments.join(", "), ""))
+    }));
+    let known: Vec<String> = items.iter().map(|item| item.label.clone()).collect();
+    for mut item in of_constants(wanted).into_iter().filter(|item| !known.contains(&item.label)) {
+        if item.kind == Some(CompletionItemKind::OPERATOR) {
+            item.detail = item.detail.map(|detail| format!("of constants only: {detail}"));
+            item.sort_text = Some(format!("~{}", item.label));
+        }
+        items.push(item);
+    }
+    items
+}
+
+/// Functions that take constants, and constants that are always there.
+fn of_constants(wanted: &CompletionOptions<'_>) -> Vec<CompletionItem> {
     let function = |function: &Function| {
         let arguments = match function.arguments() {
             0 => "a, …".to_owned(),

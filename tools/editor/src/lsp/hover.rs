@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Hover texts in Markdown for the item under the cursor. Texts for instructions, directives and functions are taken from the tables.
 
+use crate::lsp::functions::{self, EquationFunction};
 use crate::lsp::program::{CountedProgram, File, Front};
 use crate::lsp::{names, plural, timing};
 use std::fmt::Write as _;
@@ -53,6 +54,11 @@ pub(crate) fn hover(
         TokenKind::Name => {
             let called = tokens.get(index + 1).is_some_and(|next| &code[next.range.clone()] == "(");
             let placed = index > 0 && &code[tokens[index - 1].range.clone()] == "@";
+            let is_constant = tokens.iter().any(|token| token.kind == TokenKind::Directive);
+            let function = functions::named(front.machine, word).filter(|_| called && !is_constant);
+            if let Some(function) = function {
+                return Some((place, function_text(&function, front.machine)));
+            }
             match (Op::from_mnemonic(word), Function::ALL.iter().find(|function| function.name() == word)) {
                 (_, Some(function)) if called => format!("`{}`: {}", function.name(), function.text()),
                 (Some(op), _) if !placed => instruction(op.row(), front.machine),
@@ -69,6 +75,15 @@ pub(crate) fn hover(
         _ => return None,
     };
     Some((place, text))
+}
+
+/// Text for a function of an equation, with the instruction that computes it.
+fn function_text(function: &EquationFunction, machine: &'static Machine) -> String {
+    let head = format!("`{}({})`", function.name, function.arguments.join(", "));
+    match function.row {
+        Some(row) => format!("{head}, in an equation\n\n{}", instruction(row, machine)),
+        None => format!("{head}: {}", function.text),
+    }
 }
 
 /// Text for an instruction, from the manual.

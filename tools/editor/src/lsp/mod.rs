@@ -10,6 +10,7 @@
 mod complete;
 mod diagnostics;
 mod dispatch;
+mod functions;
 mod hover;
 mod inline;
 mod names;

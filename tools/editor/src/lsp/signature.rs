@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Signature help: the operands of the instruction, macro, directive or function that contains the cursor, and the one that is typed.
 
+use crate::lsp::functions;
 use crate::lsp::program::{File, Front};
 use lsp_types::{Documentation, ParameterInformation, ParameterLabel, SignatureHelp, SignatureInformation};
 use takt_asm::Directive;
@@ -47,8 +48,12 @@ pub(crate) fn signature(front: &Front, file: &File, byte: usize) -> Option<Signa
         }
     }
     // The innermost call, otherwise the operation itself once a blank follows it.
-    let called =
-        open.iter().skip(1).rev().find_map(|(name, number)| Some((called(front, word((*name)?))?, *number)));
+    let is_constant = operation.first().is_some_and(|head| head.kind == TokenKind::Directive);
+    let called = open
+        .iter()
+        .skip(1)
+        .rev()
+        .find_map(|(name, number)| Some((called(front, word((*name)?), is_constant)?, *number)));
     let (signature, number) = match called {
         Some(found) => found,
         None => {
@@ -59,8 +64,16 @@ pub(crate) fn signature(front: &Front, file: &File, byte: usize) -> Option<Signa
     Some(shown(&signature, number))
 }
 
-/// A function or macro of an equation.
-fn called(front: &Front, name: &str) -> Option<Signature> {
+/// A function or macro of an equation, or of constants.
+fn called(front: &Front, name: &str, is_constant: bool) -> Option<Signature> {
+    if let Some(function) = functions::named(front.machine, name).filter(|_| !is_constant) {
+        return Some(Signature {
+            head: name.to_owned(),
+            around: ("(", ")"),
+            operands: function.arguments.iter().map(|&name| name.to_owned()).collect(),
+            text: function.text.to_owned(),
+        });
+    }
     if let Some(function) = Function::ALL.iter().find(|function| function.name() == name) {
         let operands = match function.arguments() {
             0 => vec!["a".to_owned(), "…".to_owned()],

@@ -1009,7 +1009,7 @@ async function start() {
     sets: (texts) => usePlant({ ...state.plant, parameters: { ...state.plant.parameters, ...Object.fromEntries([...texts].map(([name, text]) => [name, Number(text)])) } }, "tune"),
   });
   parameters = new Tuning(el("parameters"), {
-    begins: (differs) => plots.keep(differs), textOf: parameterOf,
+    begins: (differs) => plots.keep(differs), textOf: parameterOf, bounded: true,
     sets: setParameters, isChanged: () => state.changes.length > 0 || Object.keys(state.parameters).length > 0,
     resets: () => {
       Object.assign(state, { parameters: {}, changes: [] });

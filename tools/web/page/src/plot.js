@@ -170,14 +170,14 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   plot.over.addEventListener("mousedown", (event) => (down = event.clientX));
   // A finger has no pointer above the chart: where it touches or moves, the values are told.
   for (const kind of ["pointerdown", "pointermove"]) plot.over.addEventListener(kind, (event) => event.pointerType === "touch" && plot.setCursor({ left: event.clientX - plot.over.getBoundingClientRect().left, top: plot.over.clientHeight / 2 }, true, true));
-  // A click, not the end of a drag, which zooms; a finger only reads.
+  // A click or a tap, not the end of a drag, which zooms.
   if (picked) {
     let waits;
     plot.over.addEventListener("dblclick", () => clearTimeout(waits));
-    plot.over.addEventListener("click", ({ clientX, detail, pointerType }) => {
+    plot.over.addEventListener("click", ({ clientX, detail }) => {
       const { idx } = plot.cursor;
       clearTimeout(waits);
-      if (pointerType === "touch" || detail > 1 || Math.abs(clientX - down) >= 3 || idx === null || idx === undefined) return;
+      if (detail > 1 || Math.abs(clientX - down) >= 3 || idx === null || idx === undefined) return;
       // A second click would end the zoom.
       waits = setTimeout(() => picked(idx), DOUBLE);
     });

@@ -108,9 +108,13 @@ export class Pen {
   }
 }
 
-/** A chart's heading: its texts, and a line in the colour of each curve before the name. */
+/** Short lines as text, by the style of a curve. */
+const LINES = { solid: "—", dashed: "╌", dotted: "┈" };
+
+/** A chart's heading: its texts in their colours, and a line in the style of each curve before the name. */
 function heading(head) {
-  const part = (node) => ({ I: `<tspan fill="${escape(node.style?.borderTopColor)}">— </tspan>`, B: `<tspan font-weight="600">${escape(node.textContent)}</tspan>`, OUTPUT: "" })[node.nodeName] ?? escape(node.textContent);
+  const line = ({ borderTopStyle, borderTopColor }) => `<tspan fill="${escape(borderTopColor)}">${LINES[borderTopStyle] ?? "—"} </tspan>`;
+  const part = (node) => ({ I: node.style && line(node.style), SPAN: node.nodeType === 1 && `<tspan fill="${escape(getComputedStyle(node).color)}">${escape(node.textContent)}</tspan>`, B: `<tspan font-weight="600">${escape(node.textContent)}</tspan>`, OUTPUT: "" })[node.nodeName] ?? escape(node.textContent);
   return [...head.childNodes].map(part).join("");
 }
 

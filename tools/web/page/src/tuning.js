@@ -14,17 +14,21 @@ function written(constant, value) {
   return constant.integer || /[.e]/.test(text) ? text : `${text}.0`;
 }
 
+/** Value within a constant's range, where one is stated. */
+const within = ({ low, high }, value) => Math.min(Math.max(value, low ?? value), high ?? value);
+
 export class Tuning {
   /**
    * @param box element with the sliders
    * @param begins called before the first change of a movement, with the constant and the text of its value
    * @param sets called with a map from names to texts
    * @param textOf returns the present text of a constant's value
+   * @param bounded values beyond a constant's range, which its declaration states, are refused
    * @param isChanged returns whether there is something to reset; without it, the texts before the changes are remembered
    * @param resets resets it
    */
-  constructor(box, { begins, sets, textOf, isChanged, resets }) {
-    Object.assign(this, { box, begins, sets, textOf, resets, rows: new Map(), originals: new Map() });
+  constructor(box, { begins, sets, textOf, bounded, isChanged, resets }) {
+    Object.assign(this, { box, begins, sets, textOf, bounded, resets, rows: new Map(), originals: new Map() });
     this.isChanged = isChanged ?? (() => this.originals.size > 0);
     this.list = box.querySelector("fieldset");
     this.back = box.querySelector("button");
@@ -94,6 +98,7 @@ export class Tuning {
           const { value, low, high } = row.constant, [from, to] = initial(value);
           end.value = short(end === least ? low ?? from : high ?? to);
         }
+        if (this.bounded) end.value = short(within(row.constant, Number(end.value)));
         row.put(Number(field.value));
       });
     }
@@ -111,10 +116,10 @@ export class Tuning {
       this.last = { row, at: performance.now() };
     });
     field.addEventListener("change", () => {
-      const text = field.value.trim();
-      if (!isNumber(text)) {
+      const why = this.refusal(row.constant, field.value.trim());
+      if (why) {
         row.put(row.constant.value);
-        field.setCustomValidity(`${text ? `"${text}" is not a number` : "a number is missing"}: ${name} stays ${field.value}`);
+        field.setCustomValidity(`${why}: ${name} stays ${field.value}`);
         field.reportValidity();
         return;
       }
@@ -123,6 +128,14 @@ export class Tuning {
       this.set(row, Number(field.value));
     });
     return row;
+  }
+
+  /** Why a constant cannot have the value of a text. */
+  refusal(constant, text) {
+    if (!text) return "a number is missing";
+    if (!isNumber(text)) return `"${text}" is not a number`;
+    const value = Number(text), limit = within(constant, value);
+    return this.bounded && value !== limit ? `${text} is ${value < limit ? "below the least value" : "above the largest value"}, ${short(limit)}` : null;
   }
 
   start({ constant }) {

@@ -20,7 +20,7 @@ const TITLE: u32 = 36;
 const LEFT: u32 = 62;
 /// Margin on the left, in pixels.
 const MARGIN: u32 = 6;
-/// Relative difference of two columns that are the same but for the rounding to binary32.
+/// Difference of two columns that are the same but for the rounding to binary32, relative to the largest value.
 const SAME: f64 = 1e-6;
 /// Most columns of a chart that have nothing in common but their unit, and the largest ratio of their ranges.
 const SHARED: usize = 4;
@@ -174,7 +174,7 @@ impl Curves {
         let mut charts: Vec<Vec<usize>> = Vec::new();
         let arrays: Vec<Option<&str>> = self.titles.iter().map(|name| array(name)).collect();
         for column in 0..self.titles.len() {
-            if self.signal_of(column).is_some() || self.is_repeated(column) {
+            if self.signal_of(column).is_some() || self.repeats(column).is_some() {
                 continue;
             }
             if let Some(of) = arrays[column] {
@@ -199,7 +199,10 @@ impl Curves {
             let value = self.range(column).map_or_else(|| "no number".to_owned(), |(low, _)| rounded(low, 6));
             format!("{} = {value} {}", self.titles[column], self.unit(&[column])).trim_end().to_owned()
         });
-        let words = words.collect();
+        let same = (0..self.titles.len()).filter_map(|column| {
+            self.repeats(column).map(|shown| format!("{} = {}", self.titles[column], self.titles[shown]))
+        });
+        let words = words.chain(same).collect();
         let mut joined: Vec<Vec<usize>> = Vec::new();
         for columns in moving {
             match joined.iter_mut().find(|chart| self.may_join(chart, &columns)) {
@@ -298,18 +301,17 @@ impl Curves {
         if columns.iter().all(|column| unit(column) == first) { first } else { "" }
     }
 
-    /// A plant's state that the column of the same name shows, too: a sensor without an error.
-    fn is_repeated(&self, column: usize) -> bool {
-        let Some((_, signal)) = self.titles[column].split_once('.') else { return false };
-        let Some(shown) = self.titles.iter().position(|name| name == signal) else { return false };
-        let is_near = |(a, b): ((f64, f64), (f64, f64))| {
-            let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(b.abs());
-            near(a.0, b.0) && near(a.1, b.1)
-        };
-        self.stretches.iter().all(|Stretch { ranges }| match (ranges[column], ranges[shown]) {
-            (Some(a), Some(b)) => is_near((a, b)),
+    /// Column of the same name that shows what a plant's state is: a sensor without an error.
+    fn repeats(&self, column: usize) -> Option<usize> {
+        let (_, signal) = self.titles[column].split_once('.')?;
+        let shown = self.titles.iter().position(|name| name == signal)?;
+        let (low, high) = self.range(shown)?;
+        let near = |a: f64, b: f64| (a - b).abs() <= SAME * low.abs().max(high.abs());
+        let same = self.stretches.iter().all(|Stretch { ranges }| match (ranges[column], ranges[shown]) {
+            (Some(a), Some(b)) => near(a.0, b.0) && near(a.1, b.1),
             (a, b) => a.is_none() && b.is_none(),
-        })
+        });
+        same.then_some(shown)
     }
 
     /// The picture.
