@@ -377,7 +377,7 @@ fn settings_replace_numbers_of_a_file() {
     };
     assert_eq!(
         (find(&file, "load"), find(&file, "load.at"), find(&file, "R")),
-        (Some(0.0), Some(0.2), Some(1.0))
+        (Some(0.4), Some(0.1), Some(1.0))
     );
     file.set("load", 3.0).unwrap();
     file.set("load.at", 0.15).unwrap();
@@ -386,10 +386,24 @@ fn settings_replace_numbers_of_a_file() {
         (find(&file, "load"), find(&file, "load.at"), find(&file, "R")),
         (Some(3.0), Some(0.15), Some(2.0))
     );
+    // A push remains as long as it was.
+    let moved = "model = \"dc_motor\"\n[parameters]\nR = 2\n[disturbance]\nload = [[0.15, 3], [0.25, 0]]";
+    let moved = PlantFile::read("p.toml", moved).unwrap();
+    let run = |file: &PlantFile| {
+        let (plant, interface) = file.simulation(PERIOD).unwrap();
+        let connection =
+            file.connect(&interface, &[port("w", 768, Type::F)], &[port("u", 0, Type::F)], &[]).unwrap();
+        let mut closed = ClosedLoop::new(plant, interface, connection, PERIOD);
+        for _ in 0..400 {
+            closed.advance(|_| Some(10.0_f32.to_bits())).unwrap();
+        }
+        closed.plant().sensors()
+    };
+    assert_eq!(run(&file), run(&moved));
     for (name, value, expected) in [
         ("J", 0.0, "parameter `J` of `dc_motor` is 0; expected a positive number"),
         ("load", f64::NAN, "expected a number"),
-        ("load.at", 0.05, "a time from 0.1 s on"),
+        ("load.at", -0.05, "a time from 0 s on"),
         ("mass", 1.0, "no parameter `mass`"),
         ("u", 1.0, "no parameter `u`"),
     ] {

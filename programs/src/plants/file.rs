@@ -26,9 +26,17 @@ pub(super) const CODE: &str = "plant";
 pub struct Course {
     /// Times in s, increasing, and values from then on.
     steps: Vec<(f64, f64)>,
+    /// Step that settings change.
+    acting: usize,
 }
 
 impl Course {
+    /// Course of these steps. Settings change the last step that does not return to 0; what follows it keeps its distance.
+    fn new(steps: Vec<(f64, f64)>) -> Course {
+        let acting = steps.iter().rposition(|(_, value)| *value != 0.0);
+        Course { acting: acting.unwrap_or(steps.len().saturating_sub(1)), steps }
+    }
+
     /// Value in a period of the given length in s. A step acts from the first period on that does not begin before it.
     pub(super) fn at(&self, period: u64, length: f64) -> f64 {
         // Rounding must not put off a step at a multiple of the period.
@@ -237,8 +245,8 @@ impl PlantFile {
         diagnostics(Arc::clone(&self.sources), vec![Diagnostic::error(CODE, place, message)])
     }
 
-    /// Numbers of a small plant's file that a user may set: parameters, and value and time of the last step of each disturbance, called
-    /// `load` and `load.at`.
+    /// Numbers of a small plant's file that a user may set: parameters, and value and time of the last step of each disturbance that does not
+    /// return to 0, called `load` and `load.at`.
     pub fn settings(&self) -> Vec<Setting> {
         let Kind::Model { model, parameters, .. } = &self.kind else { return Vec::new() };
         let own = model.parameters.iter().zip(parameters).map(|(parameter, value)| Setting {
@@ -250,8 +258,9 @@ impl PlantFile {
         let disturbances = model.inputs.iter().filter(|input| input.is_disturbance).flat_map(|input| {
             let Quantity { name, unit, text } = input.quantity;
             let course = self.disturbances.iter().find(|entry| entry.name == name);
-            let (time, value) =
-                course.and_then(|entry| entry.value.steps.last().copied()).unwrap_or_default();
+            let (time, value) = course
+                .and_then(|entry| entry.value.steps.get(entry.value.acting).copied())
+                .unwrap_or_default();
             let at = Setting {
                 name: format!("{name}.at"),
                 value: time,
@@ -284,18 +293,22 @@ impl PlantFile {
             return unknown();
         }
         let at = self.disturbances.iter().position(|entry| entry.name == signal).unwrap_or_else(|| {
-            let value = Course { steps: vec![(0.0, 0.0)] };
+            let value = Course::new(vec![(0.0, 0.0)]);
             self.disturbances.push(Entry { name: signal.to_owned(), place: Span::default(), value });
             self.disturbances.len() - 1
         });
-        let steps = &mut self.disturbances[at].value.steps;
-        let before = steps.len().checked_sub(2).map_or(0.0, |index| steps[index].0);
+        let Course { steps, acting } = &mut self.disturbances[at].value;
+        let before = acting.checked_sub(1).map_or(0.0, |index| steps[index].0);
         if !value.is_finite() || is_time && value < before {
             let expected = if is_time { format!("a time from {before} s on") } else { "a number".to_owned() };
             return Err(format!("`{name}` is {value}; expected {expected}"));
         }
-        if let Some((time, level)) = steps.last_mut() {
-            *(if is_time { time } else { level }) = value;
+        let Some((time, level)) = steps.get_mut(*acting) else { return Ok(()) };
+        if is_time {
+            let moved = value - *time;
+            steps[*acting..].iter_mut().for_each(|(time, _)| *time += moved);
+        } else {
+            *level = value;
         }
         Ok(())
     }
@@ -621,7 +634,7 @@ impl Reader {
     fn course(&mut self, value: &Spanned<DeValue<'_>>, unit: Option<&str>) -> Option<Course> {
         let Some(list) = value.get_ref().as_array() else {
             let value = self.number(value, unit)?;
-            return Some(Course { steps: vec![(0.0, value)] });
+            return Some(Course::new(vec![(0.0, value)]));
         };
         let mut steps: Vec<(f64, f64)> = Vec::new();
         for step in list.iter() {
@@ -639,7 +652,7 @@ impl Reader {
                 self.mistake(span(value.span()), "expected a list of [time in s, value]; found an empty one");
             return None;
         }
-        Some(Course { steps })
+        Some(Course::new(steps))
     }
 
     /// Time of a step, in s, which comes after the last one's.

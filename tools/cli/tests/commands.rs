@@ -579,7 +579,7 @@ fn the_plot_shows_the_path() {
     folder.line("track --gcode square.ngc --plot p.svg").ok();
     let svg = folder.read_text("p.svg");
     assert!(
-        svg.starts_with("<svg width=\"1000\" height=\"1000\" viewBox=\"0 0 8000 8000\""),
+        svg.starts_with("<svg width=\"720\" height=\"700\" viewBox=\"0 0 5760 5600\""),
         "{}",
         &svg[..200]
     );

@@ -911,6 +911,7 @@ fn neovim_shows_the_cycles() {
           for _, mark in ipairs(vim.api.nvim_buf_get_extmarks(0, space, 0, -1, { details = true })) do
             table.insert(found.hints, (mark[2] + 1) .. mark[4].virt_text[1][1])
           end
+          found.keys = vim.tbl_filter(function(key) return vim.fn.maparg(key, 'n') ~= '' end, { 'K', 'gd', 'grr', 'grn', 'gra', 'gO' })
           return #found.lenses > 0 and (#found.hints > 0 or vim.lsp.inlay_hint ~= nil)
         end, 100)
         vim.fn.writefile({ vim.fn.json_encode(found) }, vim.env.OUT)
@@ -925,6 +926,7 @@ fn neovim_shows_the_cycles() {
     };
     assert!(all("lenses").contains("period: 33 cycles, lower bound 33"), "{found}\n{stderr}");
     assert!(all("hints").is_empty() || all("hints").contains("28  6 · mul, 11 · add"), "{found}\n{stderr}");
+    assert_eq!(all("keys"), "K; gd; grr; grn; gra; gO", "{found}\n{stderr}");
 }
 
 /// Neovim's built-in client, from the first keystroke to the end.

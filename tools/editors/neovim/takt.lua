@@ -50,8 +50,24 @@ local function hint(buffer)
   end)
 end
 
+-- Keys that Neovim has by itself from 0.11 on, and `gd`; a key with a mapping keeps it.
+local keys = {
+  { 'n', 'K', 'hover' }, { 'n', 'gd', 'definition' }, { 'n', 'grr', 'references' }, { 'n', 'grn', 'rename' },
+  { 'n', 'gra', 'code_action' }, { 'n', 'gO', 'document_symbol' }, { 'i', '<C-s>', 'signature_help' },
+}
+local function map(buffer)
+  vim.bo[buffer].omnifunc = 'v:lua.vim.lsp.omnifunc'
+  for _, key in ipairs(keys) do
+    local mode, lhs, name = key[1], key[2], key[3]
+    if vim.fn.mapcheck(lhs, mode) == '' then
+      vim.keymap.set(mode, lhs, vim.lsp.buf[name], { buffer = buffer, desc = 'Takt: ' .. name:gsub('_', ' ') })
+    end
+  end
+end
+
 -- Cycles of sections and blocks above their first lines, and the hints, whenever the text rests.
 local function follow(_, buffer)
+  map(buffer)
   vim.api.nvim_create_autocmd({ 'BufEnter', 'CursorHold', 'InsertLeave', 'BufWritePost' }, {
     buffer = buffer,
     callback = function()

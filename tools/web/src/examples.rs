@@ -71,7 +71,7 @@ const KNOWN: [KnownExample; 12] = [
         text: "For makers of robots. Try the tab Robot, where it follows its path, and the tab Pipeline, with each cycle of a period.", seconds: Some(3), ..PLAIN },
     KnownExample { name: "pendulum.s", group: "Robots and machines", short: "pendulum on a cart",
         text: "For makers of machines that balance. Try KA at 15, and the pendulum swings ever further.", plant: Some("cart_pendulum"), periods: Some(6000), plotted: Some(&["force", "angle", "x", "x_ref"]), ..PLAIN },
-    KnownExample { name: "statespace.s", group: "Robots and machines", short: "six masses, state space",
+    KnownExample { name: "statespace.s", group: "Robots and machines", short: "six masses in a chain",
         text: "For controllers of many states. Try the plant's k at 20, springs softer than it was designed for: the masses swing ever further.", plant: Some("chain"), periods: Some(300), seconds: Some(2), plotted: Some(&["y[1]", "y[2]", "y[3]", "u[1]", "u[2]", "u[3]", "u[4]"]), ..PLAIN },
     KnownExample { name: "biquads.s", group: "Signals", short: "low-pass filter",
         text: "For those who filter a measurement. Try FC at 100, and the curve is smoother and later.", plotted: Some(&["x", "y"]), ..PLAIN },

@@ -13,8 +13,10 @@ use takt_programs::hybrid::params::SAMPLE_TIME;
 
 /// Maximum number of points in a curve; one per period would give hundreds of thousands.
 pub(crate) const POINTS: u64 = 1000;
-/// Size of a plot in pixels.
-pub(crate) const SIZE: u32 = 1000;
+/// Width of a plot in pixels, and heights of the path and of the errors below it.
+pub(crate) const WIDTH: u32 = 720;
+const PATH_HEIGHT: u32 = 430;
+const ERRORS_HEIGHT: u32 = 270;
 /// Drawing units per pixel. plotters uses integer coordinates, so slanted lines at pixel resolution would be jagged.
 pub(crate) const FINE: u32 = 8;
 const CUT: RGBColor = RGBColor(0x1f, 0x4e, 0x9c);
@@ -128,13 +130,14 @@ impl Plot {
     pub(crate) fn draw(&self, title: &str) -> Result<String> {
         let mut svg = String::new();
         self.draw_into(title, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
-        Ok(in_pixels(&svg, SIZE, SIZE))
+        Ok(in_pixels(&svg, WIDTH, PATH_HEIGHT + ERRORS_HEIGHT))
     }
 
     fn draw_into(&self, title: &str, svg: &mut String) -> Outcome<()> {
-        let root = SVGBackend::with_string(svg, (SIZE * FINE, SIZE * FINE)).into_drawing_area();
+        let root =
+            SVGBackend::with_string(svg, (px(WIDTH), px(PATH_HEIGHT + ERRORS_HEIGHT))).into_drawing_area();
         root.fill(&WHITE)?;
-        let (upper, lower) = root.split_vertically(px(600));
+        let (upper, lower) = root.split_vertically(px(PATH_HEIGHT));
         self.draw_path(title, &upper)?;
         self.draw_errors(&lower)?;
         root.present()?;
@@ -267,7 +270,7 @@ const HISTOGRAM_HEIGHT: u32 = 480;
 pub(crate) fn histogram(title: &str, microns: &[f64]) -> Result<String> {
     let mut svg = String::new();
     histogram_into(title, microns, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
-    Ok(in_pixels(&svg, SIZE, HISTOGRAM_HEIGHT))
+    Ok(in_pixels(&svg, WIDTH, HISTOGRAM_HEIGHT))
 }
 
 /// Width of a bar: 1, 2 or 5 times a power of ten.
@@ -278,7 +281,7 @@ fn bar_width(span: f64) -> f64 {
 }
 
 fn histogram_into(title: &str, microns: &[f64], svg: &mut String) -> Outcome<()> {
-    let root = SVGBackend::with_string(svg, (px(SIZE), px(HISTOGRAM_HEIGHT))).into_drawing_area();
+    let root = SVGBackend::with_string(svg, (px(WIDTH), px(HISTOGRAM_HEIGHT))).into_drawing_area();
     root.fill(&WHITE)?;
     let (kept, lost, limit) = (CUT.filled(), LIMIT.mix(0.6).filled(), LIMIT.stroke_width(px(2)));
     let required = format!("required: {REQUIRED} µm");
@@ -323,11 +326,11 @@ impl ArmPlot<'_> {
     pub(crate) fn draw(&self, title: &str) -> Result<String> {
         let mut svg = String::new();
         self.draw_into(title, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
-        Ok(in_pixels(&svg, SIZE, SPACE_HEIGHT + JOINTS_HEIGHT))
+        Ok(in_pixels(&svg, WIDTH, SPACE_HEIGHT + JOINTS_HEIGHT))
     }
 
     fn draw_into(&self, title: &str, svg: &mut String) -> Outcome<()> {
-        let size = (px(SIZE), px(SPACE_HEIGHT + JOINTS_HEIGHT));
+        let size = (px(WIDTH), px(SPACE_HEIGHT + JOINTS_HEIGHT));
         let root = SVGBackend::with_string(svg, size).into_drawing_area();
         root.fill(&WHITE)?;
         let (upper, lower) = root.split_vertically(px(SPACE_HEIGHT));

@@ -608,8 +608,11 @@ function act() {
 
 /** Shows the plants that the program's ports fit, and the parameters of the one that closes the loop. */
 function showPlants() {
-  // Of a program with parameters, these are what one sets; its constants are there when they are asked for.
-  if (state.tuned !== state.document?.id) el("tuning").open = !state.program.parameters.length;
+  // Of a program with parameters, these are what one sets; its constants are there when they are asked for, and so is the plant.
+  if (state.tuned !== state.document?.id) {
+    el("tuning").open = !state.program.parameters.length;
+    el("plant").open = !state.program.parameters.length && !state.program.settable.length;
+  }
   state.tuned = state.document?.id;
   const { plants } = state.program, here = plants.find(({ name }) => name === state.plant?.name), choice = el("plant-name");
   el("loop").hidden = !plants.length;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Plots of a session: joint angles, velocities and tracking errors over time, and two views of the tool path.
 
-use crate::terminal::plot::{Area, JOINT_COLORS, Outcome, POINTS, SIZE, chart, headed, in_pixels, mesh, px};
+use crate::terminal::plot::{Area, JOINT_COLORS, Outcome, POINTS, WIDTH, chart, headed, in_pixels, mesh, px};
 use anyhow::{Result, anyhow};
 use plotters::prelude::*;
 use takt_robot::controller::{RECORD_TICKS, Record};
@@ -18,11 +18,11 @@ const HEIGHT: u32 = 3 * PANEL + PATHS;
 pub(super) fn draw(title: &str, records: &[Record]) -> Result<String> {
     let mut svg = String::new();
     draw_into(title, records, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;
-    Ok(in_pixels(&svg, SIZE, HEIGHT))
+    Ok(in_pixels(&svg, WIDTH, HEIGHT))
 }
 
 fn draw_into(title: &str, records: &[Record], svg: &mut String) -> Outcome<()> {
-    let root = SVGBackend::with_string(svg, (px(SIZE), px(HEIGHT))).into_drawing_area();
+    let root = SVGBackend::with_string(svg, (px(WIDTH), px(HEIGHT))).into_drawing_area();
     root.fill(&WHITE)?;
     let (angles, rest) = root.split_vertically(px(PANEL));
     let (velocities, rest) = rest.split_vertically(px(PANEL));
@@ -51,7 +51,7 @@ fn draw_into(title: &str, records: &[Record], svg: &mut String) -> Outcome<()> {
             [x, y, z]
         })
         .collect();
-    let (left, right) = paths.split_horizontally(px(SIZE / 2));
+    let (left, right) = paths.split_horizontally(px(WIDTH / 2));
     path(
         &left,
         "The flange along z",
