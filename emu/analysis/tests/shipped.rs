@@ -6,6 +6,7 @@
 //! [`QUICK`] are computed again and compared, with TAKT_FULL all; a few random periods must keep them.
 #![allow(clippy::print_stdout)]
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -260,8 +261,9 @@ impl Measured<'_> {
         }
     }
 
-    /// A case with random values: each of its own, each an end of its range, or the same for all words of an array. The errors of long sums are
-    /// large where all terms have one sign.
+    /// A case with random values: each of its own, each an end of its range, the same for all words of an array, each near its upper end, or
+    /// near the upper end in the first half of each array and near the lower one in the second. The errors of long sums are large where all
+    /// terms have one sign, and those of what follows where such sums cancel.
     fn case(&self, random: &mut Random) -> Case {
         let mut cells = Vec::new();
         let mut groups = 0;
@@ -279,13 +281,22 @@ impl Measured<'_> {
             let group = group();
             cells.extend(range.span().map(|word| (Cell::Word(word), range.ty, range.ends(), group)));
         }
-        let way = random.below(4);
+        let way = random.below(6);
         let mut last = (0, 0);
+        let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
+        cells.iter().for_each(|(.., group)| *sizes.entry(*group).or_default() += 1);
+        let mut seen: BTreeMap<usize, usize> = BTreeMap::new();
         let drawn = cells.into_iter().map(|(cell, ty, ends, group)| {
+            let place = seen.entry(group).or_default();
+            *place += 1;
+            let is_low = way == 5 && sizes[&group] > 1 && 2 * *place > sizes[&group];
+            let near = (ends.1 - ends.0) / 16.0;
             let bits = match way {
                 0 | 1 => draw(ty, ends, random),
                 2 => draw(ty, if random.below(2) == 0 { (ends.0, ends.0) } else { (ends.1, ends.1) }, random),
-                _ if last.0 == group => last.1,
+                3 if last.0 == group => last.1,
+                4 | 5 if is_low => draw(ty, (ends.0, ends.0 + near), random),
+                4 | 5 => draw(ty, (ends.1 - near, ends.1), random),
                 _ => draw(ty, ends, random),
             };
             last = (group, bits);

@@ -549,6 +549,20 @@ test("titles of the menu are short, with the whole one beside; units and formula
   assert.deepEqual(errors, []);
 });
 
+test("a parameter keeps to its range, and a tap on a curve sets from when it acts", limit, async () => {
+  const { page, errors } = await open("#example=gains.s", { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+  await done(page);
+  const field = page.locator("#parameters .constant", { hasText: "ki" }).locator(".field");
+  await field.fill("1e9");
+  await field.press("Enter");
+  assert.equal(await field.evaluate((one) => one.validationMessage), "1e9 is above the largest value, 60: ki stays 4");
+  assert.equal(await field.inputValue(), "4");
+  assert.deepEqual(await page.evaluate(() => takt.state.parameters), {});
+  await page.locator("#lead .u-over").tap();
+  await page.waitForFunction(() => Number(document.getElementById("from").value) > 100);
+  assert.deepEqual(errors, []);
+});
+
 test("a text is shown from its beginning until somebody steps", limit, async () => {
   const { page, errors } = await open("#example=foc.s", { viewport: { width: 1400, height: 600 } });
   await done(page);
@@ -1346,7 +1360,7 @@ test("plots: ports over one axis, time, folded constants, files", limit, async (
     return { wrong: root.querySelectorAll("parsererror").length, curves: [...root.querySelectorAll("path")].filter((one) => one.getAttribute("d").length > 1000).length, texts: [...root.querySelectorAll("text")].map((one) => one.textContent) };
   }, svg.text);
   assert.deepEqual([drawn.wrong, drawn.curves], [0, 8]);
-  assert.ok(drawn.texts.includes("time, s") && drawn.texts.some((text) => /da, — db, — dc/.test(text)), `${drawn.texts}`);
+  assert.ok(drawn.texts.includes("time, s") && drawn.texts.some((text) => /da, — db, ╌ dc/.test(text)) && drawn.texts.some((text) => /— iq, ┈ id_ref, ┈ iq_ref/.test(text)), `${drawn.texts}`);
   if (process.env.TAKT_SCREENSHOTS) {
     const { page: file } = await open();
     await file.setContent(svg.text);
