@@ -110,7 +110,7 @@ period:
         Nc = asked == 0 ? whole + more : asked
         nN = place ? 0 : Nc
         nf = itof(Nc)
-        nc1 = place ? 0 : (1 + ratio)*pi/nf
+        nc1 = place ? 0 : min((1 + ratio)*pi/nf, pi)
         both = nf*((1 + ratio)*pi/nf)*2 - 2*pi
         .assume both >= 6
         nA = place ? 0 : 1/both
@@ -238,9 +238,9 @@ begun:
 .range  sweep, turn, nturn = -2*pi, 2*pi
 .range  feed = 0.001, 1
 .range  periods = 0, 36000000
-.range  k, N, nN = 0, 36000000
+.range  k, N, nN = 0, 400000000
 .range  c1, nc1 = 0, pi
-.range  A, nA = 0, 1
+.range  A, nA = 0, 0.1667
 .range  B = 0, 1e4
-.range  C = 0, 1e8
+.range  C = 0, 2e8
 ; SPDX-License-Identifier: MIT OR Apache-2.0
