@@ -88,9 +88,12 @@ module takt_fused #(
     wire        minus  = p_sign ^ z_sign;
     wire        integers = op[2] & op[0];  // imul24
 
-    wire        a_small = a[30:23] == 8'd0;  // zero or subnormal
-    wire        y_small = y[30:23] == 8'd0;
-    wire        z_small = z[30:23] == 8'd0;
+    // Zero or subnormal. Of y and z, the operands are tested before one is chosen: the exponents' sums begin with these.
+    wire        b_small = b[30:23] == 8'd0;
+    wire        c_small = c[30:23] == 8'd0;
+    wire        a_small = a[30:23] == 8'd0;
+    wire        y_small = ~op[3] & b_small;
+    wire        z_small = op[2] | (op[3] ? b_small : c_small);
 
     wire [47:0] product;  // of the next stage
     takt_significand_product u_product (
