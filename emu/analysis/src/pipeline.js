@@ -6,6 +6,8 @@ const NS = "http://www.w3.org/2000/svg";
 const ROW = 18, TALL = 30, TINY = 0.3, NAMED = 11, AXIS = 22, NARROW = 0.7, WIDE = 48, GAP = 6;
 /** Width of a telephone, and of a column there at least and at most until somebody zooms; elsewhere. */
 const PHONE = 480, THIN = [2, 20], USUAL = [7, 20];
+/** Part of the window's height that is in sight at once. */
+const SIGHT = 0.8;
 /** Pixels below the rows that are enough for the stalls. */
 const ROOM = 200;
 /** Rows that are drawn beyond the edges. */
@@ -377,8 +379,9 @@ export class Pipeline {
   resize() {
     const { scroll, sizer } = this;
     if (!scroll.clientWidth) return;
-    // With everything in sight, rows may be too low for their names.
-    const room = (scroll.clientHeight - AXIS - 8) / Math.max(1, this.rows.length), isAll = this.fits === "all" && room < ROW;
+    // With everything in sight, rows may be too low for their names. On a telephone, the picture is as tall as its content.
+    const height = this.fits === "all" ? Math.min(scroll.clientHeight, SIGHT * innerHeight) : scroll.clientHeight;
+    const room = (height - AXIS - 8) / Math.max(1, this.rows.length), isAll = this.fits === "all" && room < ROW;
     this.row = isAll ? Math.max(TINY, room) : Math.floor(Math.min(TALL, Math.max(ROW, room)));
     const isNamed = this.row >= NAMED && (this.shared?.named ?? true);
     this.parent.classList.toggle("tp-tiny", !isNamed);

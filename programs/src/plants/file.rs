@@ -158,6 +158,8 @@ pub struct Setting {
     pub unit: &'static str,
     /// Meaning in words.
     pub text: String,
+    /// Least value that makes sense, or the least positive number; `None` for any.
+    pub least: Option<f64>,
 }
 
 /// A plant's file.
@@ -254,6 +256,7 @@ impl PlantFile {
             value: *value,
             unit: parameter.unit,
             text: parameter.text.to_owned(),
+            least: Some(parameter.least),
         });
         let disturbances = model.inputs.iter().filter(|input| input.is_disturbance).flat_map(|input| {
             let Quantity { name, unit, text } = input.quantity;
@@ -266,8 +269,9 @@ impl PlantFile {
                 value: time,
                 unit: "s",
                 text: format!("time from which {name} acts"),
+                least: Some(0.0),
             };
-            [Setting { name: name.to_owned(), value, unit, text: text.to_owned() }, at]
+            [Setting { name: name.to_owned(), value, unit, text: text.to_owned(), least: None }, at]
         });
         own.chain(disturbances).collect()
     }

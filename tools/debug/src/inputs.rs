@@ -7,13 +7,14 @@ use takt_emu::{Row, Rows};
 use takt_isa::Type;
 use takt_isa::program::Port;
 
-/// Parses the text of a table into rows; more than `most` rows are an error.
+/// Parses the text of a table into rows, with a column for each of `ports`, and perhaps for some of `optional`; more than `most` rows are an
+/// error.
 ///
 /// # Errors
 /// If the table is malformed; the message has the table's name, line and column.
-pub fn rows(name: &str, text: &[u8], ports: &[Port], most: usize) -> Result<Rows, String> {
+pub fn rows(name: &str, text: &[u8], ports: &[Port], optional: &[Port], most: usize) -> Result<Rows, String> {
     let source = io::Cursor::new(text.to_vec());
-    let mut table = Table::new(name.to_owned(), Box::new(source), ports)?;
+    let mut table = Table::with_optional(name.to_owned(), Box::new(source), ports, optional)?;
     let mut rows = Rows::new();
     while let Some(row) = table.next()? {
         if rows.len() >= most {

@@ -12,6 +12,7 @@ use takt_asm::AssembledProgram;
 use takt_asm::units;
 use takt_emu::{Emulator, Rows};
 use takt_isa::Program;
+use takt_isa::program::Port;
 use takt_programs::PLANTS;
 use takt_programs::plants::{ClosedLoop, Connection, Copies, PlantFile};
 
@@ -45,10 +46,14 @@ pub(crate) fn fitting(program: &Program) -> Vec<Value> {
     let told = |(file, text): &(&str, &str)| {
         let plant = PlantFile::read(file, text).ok()?;
         let connection = connect(&plant, program).ok()?;
-        let parameters = plant
-            .settings()
-            .into_iter()
-            .map(|one| json!({ "name": one.name, "value": one.value, "unit": one.unit, "text": one.text }));
+        // A slider of a positive number begins at a tenth of the value.
+        let low = |value: f64, least: f64| if least > 0.0 { value / 10.0 } else { least };
+        let parameters = plant.settings().into_iter().map(|one| {
+            json!({
+                "name": one.name, "value": one.value, "unit": one.unit, "text": one.text,
+                "low": one.least.map(|least| low(one.value, least)), "least": one.least,
+            })
+        });
         Some(json!({
             "name": name(file), "text": plant.model()?.text,
             "gives": connection.driven().map(|port| &port.name).collect::<Vec<_>>(),
@@ -58,6 +63,16 @@ pub(crate) fn fitting(program: &Program) -> Vec<Value> {
         }))
     };
     PLANTS.iter().filter(|(file, _)| *file != TOO_SLOW).filter_map(told).collect()
+}
+
+/// Input ports that a plant gives or whose course its file states: a table need not have them.
+pub(crate) fn given(wanted: Option<&PlantRequest>, program: &Program) -> Vec<Port> {
+    let known = wanted.and_then(|wanted| PLANTS.iter().find(|(file, _)| name(file) == wanted.name));
+    let plant = known.and_then(|(file, text)| PlantFile::read(file, text).ok());
+    let connection = plant.and_then(|plant| connect(&plant, program).ok());
+    connection.map_or_else(Vec::new, |connection| {
+        connection.driven().cloned().chain(connection.optional()).collect()
+    })
 }
 
 /// Message for a plant that takes or gives other ports than a program has, with the plants that it could have.

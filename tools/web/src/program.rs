@@ -132,13 +132,19 @@ impl Playground {
         let table = wanted.inputs.as_bytes();
         let is_blank = wanted.inputs.trim().is_empty();
         // A table with other ports belongs to a previous program, and is ignored.
-        let others =
-            Table::new(INPUTS.to_owned(), Box::new(Cursor::new(table.to_vec())), &program.inputs).err();
+        let given = plant::given(wanted.plant.as_ref(), program);
+        let (optional, needed): (Vec<Port>, Vec<Port>) = program
+            .inputs
+            .iter()
+            .cloned()
+            .partition(|port| given.iter().any(|other| other.name == port.name));
+        let source = Box::new(Cursor::new(table.to_vec()));
+        let others = Table::with_optional(INPUTS.to_owned(), source, &needed, &optional).err();
         let others = others.filter(|_| !is_blank);
         let rows = if is_blank || others.is_some() {
             Ok(None)
         } else {
-            inputs::rows(INPUTS, table, &program.inputs, PERIODS).map(Some)
+            inputs::rows(INPUTS, table, &needed, &optional, PERIODS).map(Some)
         };
         let (rows, inputs_error) = match rows {
             Ok(rows) => (rows, None),

@@ -750,6 +750,8 @@ async function run() {
   });
   state.run = whole;
   state.ahead = false;
+  // Beyond the run there is nothing to draw or to change.
+  for (const id of ["which", "from"]) el(id).max = Math.max(1, whole.cycles.length);
   el("which").value = Math.min(state.which ?? WHICH, whole.cycles.length);
   plots.show(whole, state.program);
   showCycles();
@@ -1035,6 +1037,13 @@ async function start() {
   rows("keytable", [...KEYS.map(([key, what]) => [key.replace("Mod", "Ctrl"), what]), ...EDITOR_KEYS]);
 
   document.addEventListener("keydown", pressed, true);
+  // A number beyond its field's ends is the end.
+  document.addEventListener("change", ({ target }) => {
+    const { type, value, min, max } = target;
+    if (type !== "number" || value === "") return;
+    const least = min === "" ? -Infinity : Number(min), most = max === "" ? Infinity : Number(max);
+    if (Number(value) < least || Number(value) > most) target.value = Math.min(Math.max(Number(value), least), most);
+  }, true);
   el("assemble").addEventListener("click", () => assemble());
   el("stop").addEventListener("click", () => machine.stop());
   el("link").addEventListener("click", link);

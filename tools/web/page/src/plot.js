@@ -443,7 +443,8 @@ export class Plots {
 
   /** What to say if inputs are 0 because nobody gives them. */
   silence() {
-    const { plants, plant, inputs, rows, blank, inputs_of_others: others } = this.program;
+    const { plants, plant, plant_error: broken, inputs, rows, blank, inputs_of_others: others } = this.program;
+    if (broken) return `The loop is open, and its inputs are 0: ${broken}.`;
     const here = plants.find(({ name }) => name === plant?.name), driven = [...(here?.gives ?? []), ...(here?.states ?? [])], silent = inputs.filter(({ name }) => !driven.includes(name));
     if (!silent.length || (rows && !blank && !others)) return "";
     const count = silent.length, those = driven.length ? silent.map(({ name }) => name).join(", ") : count === 1 ? "the input port" : `all ${count} input ports`;

@@ -49,7 +49,8 @@ export class Tuning {
       row.formula.textContent = constant.formula ? `= ${constant.formula}` : "";
       if (!this.moving) row.put(constant.value);
     }
-    for (const [name, { last }] of this.originals) if (this.textOf(name) !== last) this.originals.delete(name);
+    const differ = (one, other) => one !== other && Number(one) !== Number(other);
+    for (const [name, { last }] of this.originals) if (differ(this.textOf(name), last)) this.originals.delete(name);
     this.back.disabled = !this.isChanged();
     this.enabled = true;
   }
@@ -102,7 +103,18 @@ export class Tuning {
         row.put(Number(field.value));
       });
     }
-    slider.addEventListener("pointerdown", () => (this.last = null));
+    // A finger that scrolls across a slider moves no value: the browser cancels the pointer, and the value is that before.
+    let before;
+    slider.addEventListener("pointerdown", () => {
+      this.last = null;
+      before = Number(field.value);
+    });
+    slider.addEventListener("pointercancel", () => {
+      this.moving = false;
+      if (Number(field.value) === before) return;
+      row.put(before);
+      this.set(row, before);
+    });
     slider.addEventListener("input", () => {
       // Each press of a key is an input and a change: together they are one movement.
       const goesOn = this.moving || (this.last?.row === row && performance.now() - this.last.at < RUN);
@@ -135,7 +147,10 @@ export class Tuning {
     if (!text) return "a number is missing";
     if (!isNumber(text)) return `"${text}" is not a number`;
     const value = Number(text), limit = within(constant, value);
-    return this.bounded && value !== limit ? `${text} is ${value < limit ? "below the least value" : "above the largest value"}, ${short(limit)}` : null;
+    if (this.bounded && value !== limit) return `${text} is ${value < limit ? "below the least value" : "above the largest value"}, ${short(limit)}`;
+    const { least } = constant;
+    if (least > 0 && value <= 0) return `${text} is not above 0`;
+    return least === 0 && value < 0 ? `${text} is below 0` : null;
   }
 
   start({ constant }) {

@@ -75,6 +75,8 @@ pub(crate) struct Curves {
     every: u64,
     rows: u64,
     stretches: Vec<Stretch>,
+    /// Periods of each column whose value is no finite number.
+    lost: Vec<u64>,
 }
 
 /// A column in a chart.
@@ -101,6 +103,7 @@ fn differ_at_the_end(one: &str, other: &str) -> bool {
 impl Curves {
     pub(crate) fn new(titles: Vec<String>, period: Option<f64>) -> Curves {
         Curves {
+            lost: vec![0; titles.len()],
             titles,
             units: Vec::new(),
             limits: Vec::new(),
@@ -136,9 +139,14 @@ impl Curves {
         }
         self.rows += 1;
         let Some(Stretch { ranges }) = self.stretches.last_mut() else { return };
-        for (range, text) in ranges.iter_mut().zip(values) {
-            if let Some(value) = text.parse::<f64>().ok().filter(|value| value.is_finite()) {
-                *range = Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))));
+        for ((range, lost), text) in ranges.iter_mut().zip(&mut self.lost).zip(values) {
+            match text.parse::<f64>() {
+                Ok(value) if value.is_finite() => {
+                    *range =
+                        Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))));
+                }
+                Ok(_) => *lost += 1,
+                Err(_) => {}
             }
         }
     }
@@ -367,11 +375,16 @@ impl Curves {
         Ok(())
     }
 
-    /// Corners of a column's curve: steps, as the values are held; a stretch of many periods has both of its ends.
-    fn points(&self, column: usize, ends: &[f64]) -> Vec<(f64, f64)> {
-        let mut points: Vec<(f64, f64)> = Vec::new();
+    /// Corners of the pieces of a column's curve: steps, as the values are held; a stretch of many periods has both of its ends. A stretch
+    /// without a number ends a piece.
+    fn pieces(&self, column: usize, ends: &[f64]) -> Vec<Vec<(f64, f64)>> {
+        let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
         for (stretch, ends) in self.stretches.iter().zip(ends.windows(2)) {
-            let Some((low, high)) = stretch.ranges.get(column).copied().flatten() else { continue };
+            let Some((low, high)) = stretch.ranges.get(column).copied().flatten() else {
+                pieces.push(Vec::new());
+                continue;
+            };
+            let Some(points) = pieces.last_mut() else { continue };
             match points.last_mut() {
                 // The value is still held.
                 Some(last) if low == high && last.1 == high && last.0 == ends[0] => last.0 = ends[1],
@@ -379,7 +392,8 @@ impl Curves {
                 _ => points.extend([(ends[0], low), (ends[0], high), (ends[1], high)]),
             }
         }
-        points
+        pieces.retain(|points| !points.is_empty());
+        pieces
     }
 
     /// Draws a chart; `ends` are the begin of the first stretch and the ends of all.
@@ -423,6 +437,15 @@ impl Curves {
         if !saturated.is_empty() {
             let style = font(13).with_color(SATURATED).into_text_style(&names);
             names.draw_text("shaded: at its limit", &style, (px(left) as i32, px(2) as i32))?;
+            left += LABEL * 21;
+        }
+        if let Some(lost) =
+            columns.iter().filter_map(|column| self.lost.get(*column)).max().filter(|lost| **lost > 0)
+        {
+            let periods = if *lost == 1 { "period" } else { "periods" };
+            let style = font(13).with_color(LIMIT).into_text_style(&names);
+            let text = format!("no finite number in {lost} {periods}");
+            names.draw_text(&text, &style, (px(left) as i32, px(2) as i32))?;
         }
         for (from, to) in saturated {
             let corners = [(ends[from], bottom), (ends[to], top)];
@@ -442,11 +465,12 @@ impl Curves {
         let (references, signals): (Vec<&Drawn>, Vec<&Drawn>) =
             drawn.iter().partition(|curve| curve.is_reference);
         for curve in references.into_iter().chain(signals) {
-            let points = self.points(curve.column, ends);
-            if curve.is_reference {
-                dashed(&mut chart, points.into_iter(), curve.color)?;
-            } else {
-                chart.draw_series(LineSeries::new(points, curve.color.stroke_width(px(3) / 2)))?;
+            for points in self.pieces(curve.column, ends) {
+                if curve.is_reference {
+                    dashed(&mut chart, points.into_iter(), curve.color)?;
+                } else {
+                    chart.draw_series(LineSeries::new(points, curve.color.stroke_width(px(3) / 2)))?;
+                }
             }
         }
         Ok(())
