@@ -546,6 +546,29 @@ fn loops_have_the_bits_of_takt_run() {
     }
 }
 
+/// A table gives what the plant does not, as `takt run --plant --inputs` reads it; other columns may be there.
+#[test]
+fn a_table_needs_no_columns_for_what_a_plant_gives() {
+    let mut playground = Playground::default();
+    let about = call(&mut playground, "about", Value::Null);
+    let pi = example(&about, "pi.s");
+    let mut speeds = Vec::new();
+    for head in ["w_ref", "w_ref,w"] {
+        let row = if head == "w_ref" { "50\n" } else { "50,7\n" };
+        let table = format!("{head}\n{}", row.repeat(100));
+        let asked = json!({ "name": "pi.s", "source": pi["source"], "machine": "t3", "inputs": table, "plant": pi["plant"] });
+        let told = call(&mut playground, "assemble", asked);
+        assert_eq!((&told["inputs_of_others"], &told["rows"]), (&Value::Null, &json!(100)), "{head}");
+        let ran = call(&mut playground, "run", json!({ "begin": true }));
+        speeds.push(ran["inputs"]["w"][99].as_f64().expect("a speed"));
+    }
+    assert!((speeds[0] - 50.0).abs() < 2.0, "{speeds:?}");
+    assert_eq!(speeds[0], speeds[1]);
+    let asked = json!({ "name": "pi.s", "source": pi["source"], "machine": "t3", "inputs": "w\n1\n", "plant": Value::Null });
+    let told = call(&mut playground, "assemble", asked);
+    assert_eq!(told["inputs_of_others"], "inputs: no column for the input port w_ref");
+}
+
 #[test]
 fn a_plant_closes_the_loop() {
     let mut playground = Playground::default();
@@ -575,6 +598,16 @@ fn a_plant_closes_the_loop() {
     }
     assert!((speeds[99] - 100.0).abs() < 3.0, "the controller reaches its reference: {}", speeds[99]);
     assert!(speeds[120] < speeds[99] - 1.0, "the load comes after 0.1 s: {}", speeds[120]);
+    // A plant's slider begins where its number makes sense, and a negative time makes none.
+    let setting = |name: &str| {
+        let all = told["plants"][0]["parameters"].as_array().expect("numbers");
+        all.iter().find(|one| one["name"] == name).unwrap_or_else(|| panic!("{name}")).clone()
+    };
+    assert_eq!(
+        setting("J")["low"],
+        setting("J")["value"].as_f64().map_or(Value::Null, |value| json!(value / 10.0))
+    );
+    assert_eq!((&setting("load")["low"], &setting("load.at")["low"]), (&Value::Null, &json!(0.0)));
     // The debugger and the pipeline see the same inputs.
     let end = call(&mut playground, "execute", json!({ "line": "goto period 140" }));
     let shown = end["view"]["inputs"][1]["value"].as_str().and_then(|text| text.parse::<f32>().ok());

@@ -529,6 +529,19 @@ mod tests {
         assert!(missing.is_empty(), "{missing:?} in {svg}");
     }
 
+    /// No line joins the values on both sides of a NaN, and the picture says how many there are.
+    #[test]
+    fn a_curve_has_gaps_where_there_is_no_number() {
+        let mut curves = Curves::new(vec!["y".to_owned()], None);
+        for value in ["1", "1", "NaN", "3", "inf", "", "5"] {
+            curves.add(&[value.to_owned()]);
+        }
+        let ends = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5];
+        let expected = [[(0.5, 1.0), (2.5, 1.0)], [(3.5, 3.0), (4.5, 3.0)], [(6.5, 5.0), (7.5, 5.0)]];
+        assert_eq!(curves.pieces(0, &ends), expected.map(Vec::from));
+        assert!(curves.draw("gaps").unwrap().contains("no finite number in 2 periods"));
+    }
+
     /// A state that a port shows, too, is drawn once, unless the sensor has an error.
     #[test]
     fn a_state_is_no_second_curve_of_its_sensor() {
