@@ -43,7 +43,7 @@ fn the_example_fits_its_board_and_a_circuit_is_written() {
     assert_eq!(
         text,
         "ulx3s-85f, t1: 2 peripherals, 2 of the program's ports on pins, a period of 5000 cycles at 50 MHz\n\
-         the core takes about 5800 of 83640 LUT4, 21 of 208 block RAMs, 6 of 156 multipliers of the LFE5U-85F (estimated); `takt board \
+         the core takes about 5700 of 83640 LUT4, 21 of 208 block RAMs, 6 of 156 multipliers of the LFE5U-85F (estimated); `takt board \
          build` counts all cells\n"
     );
     folder.line(&format!("board build --board ulx3s-85f {} --sources -o out", position())).ok();

@@ -607,7 +607,7 @@ fn the_plot_shows_the_path() {
     let extent = |pick: fn(&(f64, f64)) -> f64| {
         points.iter().map(pick).fold(f64::MIN, f64::max) - points.iter().map(pick).fold(f64::MAX, f64::min)
     };
-    assert!(extent(|p| p.0) > 1000.0, "{points:?}");
+    assert!(extent(|p| p.0) > 500.0, "{points:?}");
     assert!(
         (extent(|p| p.0) / extent(|p| p.1) - 1.0).abs() < 0.005,
         "{} by {}",

@@ -50,9 +50,9 @@ pub(super) fn limit(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> Option<Limit
 /// Operand of a limit by a constant, and where the limit does not give the result.
 pub(super) fn open(meaning: &Meaning, operands: &[Rc<Node>; 3]) -> Option<(Rc<Node>, Interval)> {
     let limit = |node: &Rc<Node>| {
-        let range = node.value.float().ok()?.actual;
-        (range.low == range.high && node.value.float().is_ok_and(|number| number.error.is_zero()))
-            .then_some(range.low)
+        let number = node.value.float().ok()?;
+        let Interval { low, high } = number.actual;
+        (low == high && number.error.is_zero()).then_some(low)
     };
     let either = |of: &[Meaning; 2]| {
         let (a, b) = (source(&of[0], operands)?, source(&of[1], operands)?);
