@@ -280,6 +280,8 @@ static INERTIA: Model = Model {
     bridge: None,
 };
 
+static MASS_STATES: [Quantity; 2] = [quantity("x", "m", "position"), quantity("v", "m/s", "velocity")];
+
 /// m·dv/dt = force + push - k·x - d·v.
 static MASS_SPRING: Model = Model {
     name: "mass_spring",
@@ -288,8 +290,8 @@ static MASS_SPRING: Model = Model {
         actuator("force", "N", "force of the actuator"),
         disturbance("push", "N", "another force on the mass"),
     ],
-    sensors: &[quantity("x", "m", "position"), quantity("v", "m/s", "velocity")],
-    states: &[quantity("x", "m", "position"), quantity("v", "m/s", "velocity")],
+    sensors: &MASS_STATES,
+    states: &MASS_STATES,
     parameters: &[
         positive("m", 1.0, "kg", "mass"),
         natural("k", 100.0, "N/m", "stiffness of the spring"),
@@ -308,6 +310,20 @@ static MASS_SPRING: Model = Model {
 /// Number of masses of the chain.
 const MASSES: usize = 6;
 const POSITION: &str = "position, 0 at rest";
+static CHAIN_STATES: [Quantity; 2 * MASSES] = [
+    quantity("x1", "m", POSITION),
+    quantity("x2", "m", POSITION),
+    quantity("x3", "m", POSITION),
+    quantity("x4", "m", POSITION),
+    quantity("x5", "m", POSITION),
+    quantity("x6", "m", POSITION),
+    quantity("v1", "m/s", "velocity"),
+    quantity("v2", "m/s", "velocity"),
+    quantity("v3", "m/s", "velocity"),
+    quantity("v4", "m/s", "velocity"),
+    quantity("v5", "m/s", "velocity"),
+    quantity("v6", "m/s", "velocity"),
+];
 
 /// Masses between walls, with springs of one stiffness: m·dv/dt = k·(left + right - 2·x) - d·v + force.
 static CHAIN: Model = Model {
@@ -321,28 +337,8 @@ static CHAIN: Model = Model {
         disturbance("blow", "N", "force on mass 2"),
         disturbance("push", "N", "force on mass 5"),
     ],
-    sensors: &[
-        quantity("x1", "m", POSITION),
-        quantity("x2", "m", POSITION),
-        quantity("x3", "m", POSITION),
-        quantity("x4", "m", POSITION),
-        quantity("x5", "m", POSITION),
-        quantity("x6", "m", POSITION),
-    ],
-    states: &[
-        quantity("x1", "m", POSITION),
-        quantity("x2", "m", POSITION),
-        quantity("x3", "m", POSITION),
-        quantity("x4", "m", POSITION),
-        quantity("x5", "m", POSITION),
-        quantity("x6", "m", POSITION),
-        quantity("v1", "m/s", "velocity"),
-        quantity("v2", "m/s", "velocity"),
-        quantity("v3", "m/s", "velocity"),
-        quantity("v4", "m/s", "velocity"),
-        quantity("v5", "m/s", "velocity"),
-        quantity("v6", "m/s", "velocity"),
-    ],
+    sensors: CHAIN_STATES.split_at(MASSES).0,
+    states: &CHAIN_STATES,
     parameters: &[
         positive("m", 0.1, "kg", "each mass"),
         natural("k", 40.0, "N/m", "stiffness of each spring"),
@@ -369,6 +365,13 @@ static CHAIN: Model = Model {
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.806_65;
 
+static PENDULUM_STATES: [Quantity; 4] = [
+    quantity("x", "m", "position of the cart"),
+    quantity("v", "m/s", "velocity of the cart"),
+    quantity("angle", "rad", "angle of the pendulum; 0 is upright"),
+    quantity("rate", "rad/s", "angular velocity of the pendulum"),
+];
+
 /// A point mass at the end of a rod on a cart; the angle is 0 upright. With l the rod's length, a the cart's acceleration:
 /// l·d²angle/dt² = g·sin - a·cos - c·rate/(m·l), (M + m·sin²)·a = force + push - b·v + m·sin·(l·rate² - g·cos) + c·rate·cos/l.
 static CART_PENDULUM: Model = Model {
@@ -378,18 +381,8 @@ static CART_PENDULUM: Model = Model {
         actuator("force", "N", "force on the cart"),
         disturbance("push", "N", "another force on the cart"),
     ],
-    sensors: &[
-        quantity("x", "m", "position of the cart"),
-        quantity("v", "m/s", "velocity of the cart"),
-        quantity("angle", "rad", "angle of the pendulum; 0 is upright"),
-        quantity("rate", "rad/s", "angular velocity of the pendulum"),
-    ],
-    states: &[
-        quantity("x", "m", "position of the cart"),
-        quantity("v", "m/s", "velocity of the cart"),
-        quantity("angle", "rad", "angle of the pendulum; 0 is upright"),
-        quantity("rate", "rad/s", "angular velocity of the pendulum"),
-    ],
+    sensors: &PENDULUM_STATES,
+    states: &PENDULUM_STATES,
     parameters: &[
         positive("M", 0.5, "kg", "mass of the cart"),
         positive("m", 0.2, "kg", "mass of the pendulum"),

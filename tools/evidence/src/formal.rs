@@ -65,7 +65,7 @@ pub(crate) struct Arguments {
     /// Of units: decide again what has been decided.
     #[arg(long, requires = "units")]
     again: bool,
-    /// Of units: decide with proofs (DRAT) by the program CaDiCaL, and let another program check each; cases with a checked proof are not
+    /// Decide units with proofs (DRAT) by the program CaDiCaL, and let another program check each; cases with a checked proof are not
     /// repeated.
     #[arg(long, requires = "units")]
     certify: bool,

@@ -132,7 +132,7 @@ pub struct Convergent {
     pub promise: usize,
     /// Step of its value at the end of the period.
     pub step: usize,
-    /// Its range when the first period begins.
+    /// Range when the first period begins.
     pub first: [f64; 2],
 }
 

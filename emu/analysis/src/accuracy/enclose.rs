@@ -790,7 +790,7 @@ impl Explorer<'_> {
                 let value = state.registers.get(register).map_or(&Value::Unknown, |node| &node.value);
                 join_into(&mut self.left_by_once, *register, value);
             }
-            // How states begin the first period.
+            // Values of states at the beginning of the first period.
             let registers =
                 state.registers.iter().map(|(register, node)| (Place::Register(*register), &node.value));
             let words = state.memory.iter().map(|(word, node)| (Place::Word(*word), &node.value));
