@@ -2,9 +2,7 @@
 """Proves arithmetic units: `cargo evidence formal --units` runs this. README.md says how, and what is trusted."""
 
 import argparse
-import datetime
 import functools
-import json
 import multiprocessing
 import queue
 import re
@@ -18,21 +16,11 @@ import enumerated
 import solve
 import tables
 import unrolled
-from circuit import FORMAL, Failure, planted
+from circuit import Failure, planted
 from units import MUTANTS, PROOFS, SHARED_MUTANTS, SLOW, SPLITS, TABLE_MUTANTS
 
-# Proofs with their dates, for docs/verification.md: committed, like rtl/synthesis.json.
-RESULTS = FORMAL / "results.json"
 # Seconds after which a mutant counts as not refuted.
 PATIENCE = 300
-
-
-def remember(kind, name, **what):
-    """Writes a result down."""
-    results = json.loads(RESULTS.read_text()) if RESULTS.is_file() else {}
-    what["date"] = datetime.date.today().isoformat()
-    results.setdefault(kind, {})[name] = what
-    RESULTS.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")
 
 
 def compared(unit):
@@ -116,7 +104,7 @@ class Session:
             raise Failure(f"{unit}: {failure}") from failure
         latency, interval = timing
         if not self.arguments.share:
-            remember("timing", unit, registers=registers)
+            solve.remember("timing", unit, registers=registers)
         every = "every cycle" if interval == 1 else f"every {interval} cycles"
         print(
             f"{unit}: {registers} registers; an operation {every}: its result comes {latency - 1} cycles after its operands and "
@@ -154,7 +142,7 @@ class Session:
         if not self.arguments.share:
             size, checking = (round(sum(one[i] for one in record.proofs.values())) for i in range(2))
             proofs = {"proofs": len(record.proofs), "bytes": size, "checking": checking} if is_solved else {}
-            remember("results", proof.name, units=proof.units, text=proof.text, cases=proof.parts, decided=decided, seconds=seconds, **proofs)
+            solve.remember("results", proof.name, units=proof.units, text=proof.text, cases=proof.parts, decided=decided, seconds=seconds, **proofs)
         if certifier:
             megabytes = sum(size for size, _ in record.proofs.values()) / 1e6
             print(f"{proof.name}: {len(record.proofs)} of {proof.parts} proofs checked, {megabytes:.1f} MB", flush=True)
@@ -215,7 +203,7 @@ class Session:
             elif self.arguments.verbose:
                 print(f"{unit}: refuted: `{fault[1]}` replaced by `{fault[2]}`: {how}", flush=True)
         if not self.arguments.share:
-            remember("mutants", unit, refuted=len(chosen) - survivors, tried=len(chosen), of=len(faults))
+            solve.remember("mutants", unit, refuted=len(chosen) - survivors, tried=len(chosen), of=len(faults))
         print(f"{unit}: {len(chosen) - survivors} of {len(chosen)} mutants refuted", flush=True)
         return survivors
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Decides with the SAT solver CaDiCaL, case by case, whether the output `bad` of a graph can be 1."""
 
+import datetime
 import json
 import os
 import subprocess
@@ -10,9 +11,11 @@ from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 
 from pysat.solvers import Solver
 
-from circuit import Failure
+from circuit import FORMAL, Failure
 
 SOLVER = "cadical195"
+# Proofs with their dates, for docs/verification.md: committed, like rtl/synthesis.json.
+RESULTS = FORMAL / "results.json"
 
 
 def literal(number):
@@ -34,6 +37,14 @@ def clauses(graph):
     for out, left, right in graph.ands:
         result += gate(out, left, right)
     return result
+
+
+def remember(kind, name, **what):
+    """Writes a result down."""
+    results = json.loads(RESULTS.read_text()) if RESULTS.is_file() else {}
+    what["date"] = datetime.date.today().isoformat()
+    results.setdefault(kind, {})[name] = what
+    RESULTS.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")
 
 
 class Certifier:

@@ -12,6 +12,7 @@ use std::fs;
 use std::path::Path;
 use takt_automation::command::root;
 use takt_isa::UNITS;
+use takt_isa::spec::machines::MACHINES;
 
 const DOCUMENT: &str = "docs/verification.md";
 const RESULTS: &str = "rtl/formal/results.json";
@@ -33,6 +34,7 @@ pub(crate) fn document() -> Result<(&'static str, String)> {
         manifest.lines().find(|line| line.starts_with("members")).context("the workspace has members")?;
     let members: Vec<&str> = members.split('"').skip(1).step_by(2).collect();
     let whole = between(DOCUMENT, &text, ("proofs", "docs"), &table(&results))?;
+    let whole = between(DOCUMENT, &whole, ("cores", "docs"), &cores(&results))?;
     let whole = between(DOCUMENT, &whole, ("tests", "docs"), &modules(&members)?)?;
     let rows = page::rows()?;
     let whole = ["units", "core", "tools", "programs"].into_iter().try_fold(whole, |whole, section| {
@@ -107,6 +109,33 @@ fn first_sentence(source: &str) -> String {
     let text = lines.collect::<Vec<_>>().join(" ");
     let end = text.find(". ").map_or(text.len(), |end| end + 1);
     text[..end].replace('|', "\\|")
+}
+
+/// Table of the machines with the proofs of their cores.
+fn cores(results: &Value) -> String {
+    let mut text = String::from(
+        "| machine | properties | invariants | registers | a bundle waits for at most | s of solving | proofs checked | planted faults refuted | on |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
+    );
+    for machine in MACHINES {
+        let core = &results["core"][machine.name];
+        let [properties, invariants, registers, waits, seconds, checking, refuted, tried] =
+            ["properties", "invariants", "registers", "waits", "seconds", "checking", "refuted", "tried"]
+                .map(|key| core[key].to_string());
+        if core.is_null() {
+            let _ = writeln!(text, "| {} | not proved | | | | | | | |", machine.name);
+            continue;
+        }
+        let megabytes = core["bytes"].as_f64().unwrap_or_default() / 1e6;
+        let faults = if core["tried"].is_null() { "–".to_owned() } else { format!("{refuted} of {tried}") };
+        let date = core["date"].as_str().unwrap_or_default();
+        let _ = writeln!(
+            text,
+            "| {} | {properties} | {invariants} | {registers} | {waits} cycles | {seconds} | {megabytes:.0} MB, {checking} s | {faults} | {date} |",
+            machine.name
+        );
+    }
+    text
 }
 
 /// Table of the units with their proofs.
