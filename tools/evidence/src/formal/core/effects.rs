@@ -180,6 +180,7 @@ fn memory(plan: &Plan, of: &mut Reference) {
 /// Signals that report what has issued.
 fn reports(plan: &Plan, of: &mut Reference) {
     let control = issued(plan.control());
+    let ends = of.seen("sequencer.i_ends", "");
     let (wait, publish) = (control.effect(Effect::Wait), control.effect(Effect::Publish));
     let _ = writeln!(
         of.text,
@@ -187,7 +188,7 @@ fn reports(plan: &Plan, of: &mut Reference) {
     // What issued in the last cycle, and in the one before.
     reg f_issued1, f_issued2, f_ended1, f_ended2, f_published1, f_published2;
     always @(posedge {clk}) begin
-        {{f_issued1, f_ended1, f_published1}} <= {{f_issues, f_issues & {wait}, f_issues & {publish}}};
+        {{f_issued1, f_ended1, f_published1}} <= {{f_issues, f_issues & {wait} & ~{ends}, f_issues & {publish} & ~{ends}}};
         {{f_issued2, f_ended2, f_published2}} <= {{f_issued1, f_ended1, f_published1}};
         if ({rst}) {{f_issued1, f_ended1, f_published1, f_issued2, f_ended2, f_published2}} <= 6'd0;
     end",
@@ -215,6 +216,52 @@ fn reports(plan: &Plan, of: &mut Reference) {
     ] {
         let register = inner(of, "sequencer", name);
         of.equal(name, "f_live", &register, own);
+    }
+    // A store in another slot than that at fault may take effect.
+    let store = plan.memory().next().is_some_and(|slot| slot.number as usize == plan.control_slot);
+    let reports = [net::ISSUED, net::ENDED, net::PUBLISHED].into_iter().chain(store.then_some(net::STORED));
+    of.promise(
+        "no bundle at fault is reported, stores, publishes or ends a period, and none after it",
+        &format!("~{} & {}", net::RST, net::FAULT),
+        &any(reports.map(|signal| signal.to_string())),
+        "1'b0",
+    );
+    for (name, effect) in [("x_call", Effect::Call), ("x_return", Effect::Return), ("x_loop", Effect::Loop)] {
+        let (register, own) = (inner(of, "sequencer", name), format!("f_{name}"));
+        let _ = writeln!(
+            of.text,
+            "    reg {own};\n    always @(posedge {}) {own} <= f_issues & {};",
+            net::CLK,
+            control.effect(effect)
+        );
+        of.equal(name, "f_live", &register, &own);
+        if store {
+            of.never(name, &format!("f_live & {own} & (f_x_port0_stores | f_x_port0_loads)"));
+        }
+    }
+    of.never("nothing issues with an illegal bundle", &format!("~{} & f_refused & f_issued1", net::RST));
+    of.never("only what issues stores", &format!("~{} & f_x_port0_stores & ~f_issued1", net::RST));
+    let nested = inner(of, "sequencer", "x_nested");
+    let redirects = any([
+        Effect::Jump,
+        Effect::BranchZero,
+        Effect::BranchNonzero,
+        Effect::Call,
+        Effect::Return,
+        Effect::Loop,
+        Effect::Publish,
+        Effect::Wait,
+        Effect::Halt,
+    ]
+    .map(|effect| control.effect(effect)));
+    let _ = writeln!(
+        of.text,
+        "    reg f_nested;\n    always @(posedge {}) f_nested <= f_issues & {ends} & {redirects};",
+        net::CLK
+    );
+    of.equal("x_nested", "f_live", &nested, "f_nested");
+    if store {
+        of.never("x_nested", "f_live & f_nested & (f_x_port0_stores | f_x_port0_loads)");
     }
     of.equal("issued", "f_live", &net::X_ISSUED.to_string(), "f_issued1");
     of.equal("issued", "f_live", &net::WAS_ISSUED.to_string(), "f_issued2");

@@ -17,6 +17,7 @@ pub(super) fn add(plan: &Plan, of: &mut Reference) {
     for slot in &plan.slots {
         decoded(slot, of);
         flight(plan, slot, of);
+        sure(plan, slot, of);
         for late in &slot.late {
             tracker(plan, slot, late, of);
         }
@@ -26,9 +27,10 @@ pub(super) fn add(plan: &Plan, of: &mut Reference) {
     }
     for (slot, operand) in plan.sources() {
         source(plan, slot, operand, of);
+        hazard(plan, Address::Source(slot, operand), of);
     }
     for slot in &plan.slots {
-        destination(plan, slot, of);
+        hazard(plan, Address::Destination(slot), of);
     }
     waits(plan, of);
 }
@@ -47,14 +49,14 @@ fn front_end(plan: &Plan, of: &mut Reference) {
             .map(|name| inner(of, "sequencer", name));
     let refill = plan.machine.refill;
     // Until the flush, any stage may be valid.
-    let _ = writeln!(of.text, "    wire f_filled = f_live & ~(f_squash & f_left >= 4'd{});", refill - 1);
+    let _ = writeln!(of.text, "    wire f_filled = f_first & ~(f_squash & f_left >= 4'd{});", refill - 1);
     of.never(
         "f_left",
-        &format!("f_live & (f_left > 4'd{refill} | (~f_squash & f_left > 4'd{}))", plan.machine.resolve),
+        &format!("f_first & (f_left > 4'd{refill} | (~f_squash & f_left > 4'd{}))", plan.machine.resolve),
     );
     of.equal(
         "flush",
-        "f_live",
+        "f_first",
         &net::FLUSH.to_string(),
         &format!("f_squash & (f_left == 4'd{})", refill - 1),
     );
@@ -63,27 +65,29 @@ fn front_end(plan: &Plan, of: &mut Reference) {
         let filled = format!("~f_squash | (f_left <= 4'd{})", refill - at);
         of.equal("valid", "f_filled", stage, &filled);
     }
-    of.equal("x_if_zero", "f_live", &zero, &format!("f_if_zero | (f_squash & f_left == 4'd{refill})"));
+    of.equal("x_if_zero", "f_first", &zero, &format!("f_if_zero | (f_squash & f_left == 4'd{refill})"));
     of.equal(
         "x_if_nonzero",
-        "f_live",
+        "f_first",
         &nonzero,
         &format!("f_if_nonzero | (f_squash & f_left == 4'd{refill})"),
     );
     let undecided = format!("~f_squash & f_left == 4'd{}", plan.machine.resolve);
-    of.equal("a branch is under way", "f_live", "f_if_zero | f_if_nonzero", &undecided);
-    of.never("one kind of branch is under way", "f_live & f_if_zero & f_if_nonzero");
-    of.equal("advance", "f_live", &net::ADVANCE.to_string(), &format!("~{i} | {}", net::ISSUE));
+    of.equal("a branch is under way", "f_first", "f_if_zero | f_if_nonzero", &undecided);
+    of.never("one kind of branch is under way", "f_first & f_if_zero & f_if_nonzero");
+    of.equal("advance", "f_first", &net::ADVANCE.to_string(), &format!("~{i} | {}", net::ISSUE));
     of.equal("halted", "f_live", &format!("{halt} | {}", net::HALTED), "f_halted");
     of.equal("refused", "f_live", &refused, "f_refused & ~f_refuses");
     let waiting = format!("{} | ({wait} & ~{remembered})", net::WAITING);
-    of.equal("waiting", "f_live", &waiting, "f_waiting");
-    of.equal("remembered", "f_live", &format!("{remembered} & ~{wait}"), "f_remembered");
+    of.equal("waiting", "f_first", &waiting, "f_waiting");
+    of.equal("remembered", "f_first", &format!("{remembered} & ~{wait}"), "f_remembered");
     of.never(
         "a wait is under way",
-        &format!("f_live & {wait} & ({} | ~f_squash | f_left != 4'd{refill})", net::WAITING),
+        &format!("f_first & {wait} & ({} | ~f_squash | f_left != 4'd{refill})", net::WAITING),
     );
-    of.never("a tick is remembered while the machine waits", "f_live & f_waiting & f_remembered");
+    of.never("a tick is remembered while the machine waits", "f_first & f_waiting & f_remembered");
+    of.never("a fault stays", &format!("~{} & f_over & ~{}", net::RST, net::FAULT));
+    of.never("nothing issues after a fault", &format!("~{} & f_over & {}", net::RST, net::ISSUE));
 }
 
 /// Condition: the stage has a bundle, and it is legal.
@@ -105,8 +109,8 @@ fn decoded(slot: &SlotPlan, of: &mut Reference) {
         let own = Decoded { slot, stage };
         // A word from outside of the program memory is illegal.
         let illegal = format!("~{} | f_{stage}_outside", own.legal());
-        of.equal("illegal", &format!("f_live & {valid}"), &slot.illegal(stage).to_string(), &illegal);
-        let when = format!("f_live & {}", has(of, stage));
+        of.equal("illegal", &format!("f_first & {valid}"), &slot.illegal(stage).to_string(), &illegal);
+        let when = format!("f_first & {}", has(of, stage));
         for (number, &latency) in slot.latencies.iter().enumerate() {
             let bit = slot.bit(stage, ControlBit::Result(latency)).to_string();
             of.equal("result", &when, &bit, &format!("{}[{number}]", own.result()));
@@ -149,10 +153,52 @@ fn decoded(slot: &SlotPlan, of: &mut Reference) {
         of.never(
             "bubble",
             &format!(
-                "f_live & f_squash & f_left >= 4'd{from} & f_left <= 4'd{to} & (|{})",
+                "f_first & f_squash & f_left >= 4'd{from} & f_left <= 4'd{to} & (|{})",
                 slot.control(stage)
             ),
         );
+    }
+}
+
+/// Results that no fault cancels any more are those of the shift register that issued three cycles ago or before.
+fn sure(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
+    let (name, rst, fault) = (slot.name(), net::RST, net::FAULT);
+    let range = format!("[{}:0]", slot.depth - 1);
+    let mut inner = |register: &str| of.seen(&format!("{}.{register}", slot.results()), &range);
+    let (fresh, recent) = (inner("fresh"), inner("recent"));
+    let (valid, index) = (slot.in_flight(), slot.in_flight_index());
+    for place in 0..slot.depth.min(places(slot)) {
+        let stays = format!("{valid}[{place}] & ~{fresh}[{place}] & ~{recent}[{place}]");
+        let own = format!("{index}[{} +: {}]", place * plan.index, plan.index);
+        of.equal("sure", &format!("~{rst}"), &stays, &format!("f_{name}_sure[{place}]"));
+        of.equal(
+            "sure",
+            &format!("~{rst} & f_{name}_sure[{place}]"),
+            &own,
+            &super::rules::sure_register(plan, slot, place),
+        );
+        for (vector, age) in [(&fresh, 1), (&recent, 2)] {
+            let issued = slot.latencies.iter().position(|&latency| latency == place + age);
+            let issued = issued.map_or("1'b0".to_owned(), |number| format!("f_{name}_new{age}[{number}]"));
+            of.equal("fresh", &format!("~{rst} & ~{fault}"), &format!("{vector}[{place}]"), &issued);
+            of.never("fresh", &format!("~{rst} & ~{fault} & {vector}[{place}] & ~{valid}[{place}]"));
+            of.equal("fresh", &format!("~{rst} & ~{fault} & {issued}"), &own, &format!("f_{name}_dest{age}"));
+        }
+    }
+    for place in 0..places(slot) {
+        let new = slot.latencies.iter().position(|&latency| latency == place + 1);
+        let new = new.map_or("1'b0".to_owned(), |number| format!("f_{name}_new1[{number}]"));
+        let now = format!("f_{name}_sure_now[{place}]");
+        of.equal("booked", "f_live", &booked(slot, place), &format!("{now} | {new}"));
+        let own = format!("f_{name}_sure_register_now[{} +: {}]", place * plan.index, plan.index);
+        of.equal("booked", &format!("f_live & {now}"), &register(plan, slot, place), &own);
+        of.equal(
+            "booked",
+            &format!("f_live & {new}"),
+            &register(plan, slot, place),
+            &format!("f_{name}_dest1"),
+        );
+        of.never("booked", &format!("f_live & {now} & {new}"));
     }
 }
 
@@ -160,12 +206,12 @@ fn decoded(slot: &SlotPlan, of: &mut Reference) {
 fn flight(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
     let (valid, index) = (slot.in_flight(), slot.in_flight_index());
     for place in 0..slot.depth {
-        of.equal("place", "f_live", &format!("{valid}[{place}]"), &booked(slot, place));
+        of.equal("place", "f_first", &format!("{valid}[{place}]"), &booked(slot, place));
         if place < places(slot) {
             let own = format!("{index}[{} +: {}]", place * plan.index, plan.index);
             of.equal(
                 "register",
-                &format!("f_live & {}", booked(slot, place)),
+                &format!("f_first & {}", booked(slot, place)),
                 &own,
                 &register(plan, slot, place),
             );
@@ -176,7 +222,7 @@ fn flight(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
         of.never(
             "register",
             &format!(
-                "f_live & {} & ({} >= {}'d{depth})",
+                "f_first & {} & ({} >= {}'d{depth})",
                 booked(slot, place),
                 register(plan, slot, place),
                 plan.index
@@ -188,7 +234,7 @@ fn flight(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
             of.never(
                 "one result for a register",
                 &format!(
-                    "f_live & {} & {} & ({} == {})",
+                    "f_first & {} & {} & ({} == {})",
                     booked(slot, low),
                     booked(slot, high),
                     register(plan, slot, low),
@@ -214,19 +260,41 @@ fn tracker(plan: &Plan, slot: &SlotPlan, late: &LateUnit, of: &mut Reference) {
     let age = age(slot, late, of);
     let working = of.seen(&format!("{}.working", slot.late_instance(late)), "");
     let (latency, interval) = (late.unit.latency, late.unit.interval);
-    of.never("one operation", &format!("f_live & ({age} & ({age} - 1'b1)) != 0"));
+    of.never("one operation", &format!("f_first & ({age} & ({age} - 1'b1)) != 0"));
     of.equal(
         "in flight",
-        "f_live",
+        "f_first",
         &slot.late_in_flight(late).to_string(),
         &format!("|{age}[{}:1]", late.beyond),
     );
-    of.equal("working", "f_live", &working, &format!("|{age}[{}:1]", interval - 1));
+    of.equal("working", "f_first", &working, &format!("|{age}[{}:1]", interval - 1));
     let left = (1..interval).map(|k| format!("({{6{{{age}[{k}]}}}} & 6'd{})", interval - k));
-    of.equal("busy", "f_live", &any(left), &busy(slot, late));
+    of.equal("busy", "f_first", &any(left), &busy(slot, late));
     for k in 1..=late.beyond {
         let own = slot.late_index(late).to_string();
-        of.equal("tracked", &format!("f_live & {age}[{k}]"), &own, &register(plan, slot, latency - k));
+        if k >= 3 {
+            of.equal(
+                "sure",
+                &format!("~{} & {age}[{k}]", net::RST),
+                &own,
+                &super::rules::sure_register(plan, slot, latency - k),
+            );
+        } else {
+            let issued = slot
+                .latencies
+                .iter()
+                .position(|&other| other == latency)
+                .expect("the latency is one of the slot's");
+            let name = slot.name();
+            let _ = issued;
+            of.equal(
+                "tracked",
+                &format!("~{} & ~{} & {age}[{k}]", net::RST, net::FAULT),
+                &own,
+                &format!("f_{name}_dest{k}"),
+            );
+        }
+        of.equal("tracked", &format!("f_first & {age}[{k}]"), &own, &register(plan, slot, latency - k));
     }
 }
 
@@ -239,48 +307,78 @@ fn beyond(slot: &SlotPlan, of: &mut Reference) {
             .filter(|late| late.unit.latency > place)
             .map(|late| format!("{}[{}]", age(slot, late, of), late.unit.latency - place))
             .collect();
-        of.equal("beyond", "f_live", &booked(slot, place), &any(tracked.clone()));
+        of.equal("beyond", "f_first", &booked(slot, place), &any(tracked.clone()));
+        let old = slot.late.iter().filter(|late| late.unit.latency >= place + 3);
+        let old = any(old
+            .map(|late| format!("{}[{}]", age(slot, late, of), late.unit.latency - place))
+            .collect::<Vec<_>>());
+        of.equal("sure", &format!("~{}", net::RST), &format!("f_{}_sure[{place}]", slot.name()), &old);
         for (number, first) in tracked.iter().enumerate() {
             for second in &tracked[number + 1..] {
-                of.never("one tracker", &format!("f_live & {first} & {second}"));
+                of.never("one tracker", &format!("f_first & {first} & {second}"));
             }
         }
     }
 }
 
-/// The address is in issue, and its result, which an operation there computes, has not begun.
-fn on_issue(
-    plan: &Plan,
-    of: &mut Reference,
-    bank: impl Fn(&SlotPlan) -> String,
-    index: &str,
-    latencies: impl Fn(u32) -> bool,
-) -> String {
-    let valid = inner(of, "issuing", "i_valid");
-    any(plan.slots.iter().map(|slot| {
-        let issuing = Decoded { slot, stage: Stage::Issue };
-        let results = slot.latencies.iter().enumerate().filter(|(_, latency)| latencies(**latency));
-        let writes = any(results.map(|(number, _)| format!("{}[{number}]", issuing.result())));
-        format!("({} & {valid} & {writes} & ({} == {index}))", bank(slot), issuing.dest())
-    }))
+/// Address that a takt_hazard looks after.
+#[derive(Clone, Copy)]
+enum Address<'p> {
+    Source(&'p SlotPlan, usize),
+    Destination(&'p SlotPlan),
+}
+
+impl Address<'_> {
+    fn instance(self) -> String {
+        match self {
+            Address::Source(slot, operand) => format!("{}.hazard", slot.source(operand)),
+            Address::Destination(slot) => slot.dest_instance(),
+        }
+    }
+
+    /// Slots whose banks the address can be in.
+    fn width(self, plan: &Plan) -> usize {
+        match self {
+            Address::Source(..) => plan.slots.len(),
+            Address::Destination(_) => 1,
+        }
+    }
+
+    /// Condition: a result for the address of the bundle in a stage is in flight, in one of the places that each slot has.
+    fn flies(self, plan: &Plan, stage: Stage, places: impl Fn(&SlotPlan) -> Vec<u32>) -> String {
+        match self {
+            Address::Source(slot, operand) => pending(plan, &Decoded { slot, stage }, operand, places),
+            Address::Destination(slot) => taken(plan, &Decoded { slot, stage }, places(slot)),
+        }
+    }
+
+    /// Condition: a result for the address of the bundle in read is still to be computed by the bundle in issue, with one of the latencies.
+    fn computed(self, plan: &Plan, of: &mut Reference, latencies: impl Fn(u32) -> bool) -> String {
+        let valid = inner(of, "issuing", "i_valid");
+        any(plan.slots.iter().map(|producer| {
+            let issuing = Decoded { slot: producer, stage: Stage::Issue };
+            let results = producer.latencies.iter().enumerate().filter(|(_, latency)| latencies(**latency));
+            let writes = any(results.map(|(number, _)| format!("{}[{number}]", issuing.result())));
+            let (bank, index) = match self {
+                Address::Source(slot, operand) => {
+                    let reading = Decoded { slot, stage: Stage::Read };
+                    (format!("{}[{}]", reading.bank(operand), producer.number), reading.index(operand))
+                }
+                Address::Destination(slot) => {
+                    let writing = Decoded { slot, stage: Stage::Read };
+                    let is_own = slot.number == producer.number;
+                    (if is_own { writing.writes() } else { "1'b0".to_owned() }, writing.dest())
+                }
+            };
+            format!("({bank} & {valid} & {writes} & ({} == {index}))", issuing.dest())
+        }))
+    }
 }
 
 /// State of a takt_hazard: where in flight the result for its address is.
-struct Hazard<'a> {
-    instance: String,
-    /// Slots whose banks the address can be in.
-    width: u32,
-    /// Condition: a result for the address, in a stage, is in one of the places.
-    flies: Box<dyn Fn(Stage, &dyn Fn(&SlotPlan) -> Vec<u32>) -> String + 'a>,
-    /// Condition: the address in read is in the bank of a slot.
-    bank: Box<dyn Fn(&SlotPlan) -> String + 'a>,
-    /// Index of the address in read.
-    index: String,
-}
-
-fn hazard(plan: &Plan, of: &mut Reference, hazard: &Hazard<'_>) {
-    let Hazard { instance, width, flies, bank, index } = hazard;
-    let range = format!("[{}:0]", width - 1);
+fn hazard(plan: &Plan, address: Address<'_>, of: &mut Reference) {
+    let instance = address.instance();
+    let range = format!("[{}:0]", address.width(plan) - 1);
     let wide = |of: &mut Reference, name: &str| of.seen(&format!("{instance}.{name}"), &range);
     let (near, far) = (wide(of, "r_near"), wide(of, "r_far"));
     let [from_issue, r_at1, r_at0, r_on_issue, early, late, i_later, i_at1] = [
@@ -293,7 +391,7 @@ fn hazard(plan: &Plan, of: &mut Reference, hazard: &Hazard<'_>) {
         "i_later",
         "i_at1",
     ]
-    .map(|name| inner(of, instance, name));
+    .map(|name| inner(of, &instance, name));
     let read = in_read(of);
     let issue = format!("f_filled & {}", has(of, Stage::Issue));
     let from = |first: u32| move |slot: &SlotPlan| (first..places(slot)).collect::<Vec<_>>();
@@ -302,26 +400,24 @@ fn hazard(plan: &Plan, of: &mut Reference, hazard: &Hazard<'_>) {
         "r_later",
         &read,
         &format!("(|{near}) | (|{far}) | {from_issue}"),
-        &flies(Stage::Read, &from(2)),
+        &address.flies(plan, Stage::Read, from(2)),
     );
-    of.equal("r_at1", &read, &r_at1, &flies(Stage::Read, &only(1)));
-    of.equal("r_at0", &read, &r_at0, &flies(Stage::Read, &only(0)));
-    let computed =
-        |of: &mut Reference, latencies: &dyn Fn(u32) -> bool| on_issue(plan, of, bank, index, latencies);
-    let all = computed(of, &|_| true);
+    of.equal("r_at1", &read, &r_at1, &address.flies(plan, Stage::Read, only(1)));
+    of.equal("r_at0", &read, &r_at0, &address.flies(plan, Stage::Read, only(0)));
+    let all = address.computed(plan, of, |_| true);
     of.equal("r_on_issue", &read, &r_on_issue, &all);
-    let soon = computed(of, &|latency| latency == 2);
+    let soon = address.computed(plan, of, |latency| latency == 2);
     of.equal("r_on_issue_early", &read, &early, &soon);
-    let not_soon = computed(of, &|latency| latency != 2);
-    of.equal("r_on_issue_late", &read, &late, &not_soon);
-    of.equal("i_later", &issue, &i_later, &flies(Stage::Issue, &from(2)));
-    of.equal("i_at1", &issue, &i_at1, &flies(Stage::Issue, &only(1)));
+    let later = address.computed(plan, of, |latency| latency != 2);
+    of.equal("r_on_issue_late", &read, &late, &later);
+    of.equal("i_later", &issue, &i_later, &address.flies(plan, Stage::Issue, from(2)));
+    of.equal("i_at1", &issue, &i_at1, &address.flies(plan, Stage::Issue, only(1)));
 }
 
-/// A source: its bank and index in each stage, and its hazards.
+/// Bank and index of a source in each stage.
 fn source(plan: &Plan, slot: &SlotPlan, operand: usize, of: &mut Reference) {
     let instance = slot.source(operand);
-    let (banks, last) = (plan.slots.len() as u32, plan.index - 1);
+    let (banks, last) = (plan.slots.len(), plan.index - 1);
     for stage in STAGES {
         let own = Decoded { slot, stage };
         let (bank, index) = match stage {
@@ -333,34 +429,10 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, of: &mut Reference) {
                 of.seen(&format!("{instance}.{stage}_index"), &format!("[{last}:0]")),
             ),
         };
-        let when = format!("f_live & {}", has(of, stage));
+        let when = format!("f_first & {}", has(of, stage));
         of.equal("bank", &when, &bank, &own.bank(operand));
         of.equal("index", &when, &index, &own.index(operand));
     }
-    let at = move |stage| Decoded { slot, stage };
-    let found = Hazard {
-        instance: format!("{instance}.hazard"),
-        width: banks,
-        flies: Box::new(move |stage, places| pending(plan, &at(stage), operand, places)),
-        bank: Box::new(move |producer| format!("{}[{}]", at(Stage::Read).bank(operand), producer.number)),
-        index: at(Stage::Read).index(operand),
-    };
-    hazard(plan, of, &found);
-}
-
-/// A destination's hazards.
-fn destination(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
-    let at = move |stage| Decoded { slot, stage };
-    let found = Hazard {
-        instance: slot.dest_instance(),
-        width: 1,
-        flies: Box::new(move |stage, places| taken(plan, &at(stage), places(slot))),
-        bank: Box::new(move |producer| {
-            if producer.number == slot.number { at(Stage::Read).writes() } else { "1'b0".to_owned() }
-        }),
-        index: at(Stage::Read).dest(),
-    };
-    hazard(plan, of, &found);
 }
 
 /// Results in flight and busy units are gone when as many cycles have passed since the last issue.
@@ -369,7 +441,7 @@ fn waits(plan: &Plan, of: &mut Reference) {
         for place in 0..places(slot) {
             of.never(
                 "quiet",
-                &format!("f_live & {} & (f_quiet > 6'd{})", booked(slot, place), places(slot) - 1 - place),
+                &format!("f_first & {} & (f_quiet > 6'd{})", booked(slot, place), places(slot) - 1 - place),
             );
         }
         for late in &slot.late {
@@ -377,13 +449,13 @@ fn waits(plan: &Plan, of: &mut Reference) {
             of.never(
                 "quiet",
                 &format!(
-                    "f_live & ({u} != 6'd0) & ({{1'b0, f_quiet}} + {{1'b0, {u}}} > 7'd{})",
+                    "f_first & ({u} != 6'd0) & ({{1'b0, f_quiet}} + {{1'b0, {u}}} > 7'd{})",
                     late.unit.interval - 1
                 ),
             );
         }
     }
-    of.never("f_waits", "f_live & f_waits > f_quiet");
-    of.never("f_waits", "f_live & (f_waits != 6'd0) & ~f_i_legal");
-    of.never("f_waits", &format!("f_live & f_waits > 6'd{}", longest(plan)));
+    of.never("f_waits", "f_first & f_waits > f_quiet");
+    of.never("f_waits", "f_first & (f_waits != 6'd0) & ~f_i_legal");
+    of.never("f_waits", &format!("f_first & f_waits > 6'd{}", longest(plan)));
 }

@@ -89,6 +89,11 @@ pub(super) fn register(plan: &Plan, slot: &SlotPlan, place: u32) -> String {
     format!("f_{}_register[{} +: {}]", slot.name(), place * plan.index, plan.index)
 }
 
+/// Register of a result that no fault cancels any more.
+pub(super) fn sure_register(plan: &Plan, slot: &SlotPlan, place: u32) -> String {
+    format!("f_{}_sure_register[{} +: {}]", slot.name(), place * plan.index, plan.index)
+}
+
 /// Counter of the reference: cycles until the unit accepts an operation.
 pub(super) fn busy(slot: &SlotPlan, late: &LateUnit) -> String {
     format!("f_{}_{}_busy", slot.name(), late.unit.name)
@@ -211,27 +216,16 @@ fn front_end(plan: &Plan, of: &mut Reference) {
         format!("({} & {short})", effect(Effect::Loop)),
     ]);
     let branches = any([effect(Effect::BranchZero), effect(Effect::BranchNonzero)]);
-    let ending = any([
-        Effect::Jump,
-        Effect::Call,
-        Effect::Return,
-        Effect::Wait,
-        Effect::Loop,
-        Effect::BranchZero,
-        Effect::BranchNonzero,
-        Effect::Halt,
-        Effect::Publish,
-    ]
-    .map(effect));
     let tested = plan.control().operand(0);
     let _ = writeln!(
         of.text,
         "
-    // Rule 1. f_left: cycles until the front end delivers a bundle; f_squash: it fetches anew. f_over: no bundle issues any more.
+    // Rule 1. f_left: cycles until the front end delivers a bundle; f_squash: it fetches anew. f_over: a fault has been reported.
     reg [3:0] f_left;
     reg f_squash, f_waiting, f_remembered, f_halted, f_over, f_refused, f_if_zero, f_if_nonzero;
     wire f_issues, f_refuses;
-    wire f_live = ~{rst} & ~{fault} & ~f_over;
+    wire f_first = ~{rst} & ~f_over;
+    wire f_live  = f_first & ~{fault};
     wire f_delivered = (f_left == 4'd0) & ~f_waiting & ~f_halted & ~f_refused;
     wire f_redirected = (f_if_zero & ({tested} == 32'd0)) | (f_if_nonzero & ({tested} != 32'd0));
     wire f_ticked = f_remembered | ({ticks} & ~f_waiting);
@@ -245,11 +239,12 @@ fn front_end(plan: &Plan, of: &mut Reference) {
         if (f_issues & {branches}) f_left <= 4'd{resolve};
         f_remembered <= f_ticked;
         f_waiting    <= f_waiting & ~{ticks};
-        if (f_issues & {wait}) begin f_waiting <= ~f_ticked; f_remembered <= 1'b0; end
-        if (f_issues & {halt}) f_halted <= 1'b1;
+        // In the last bundle of a loop, both are at fault, and a halt keeps the next bundle for a cycle.
+        if (f_issues & {wait} & ~{ends}) begin f_waiting <= ~f_ticked; f_remembered <= 1'b0; end
+        if (f_issues & {halt} & ~{ends}) f_halted <= 1'b1;
+        if (f_issues & {halt} & {ends}) f_left <= 4'd1;
         if (f_refuses) f_refused <= 1'b1;
-        // The last bundle of a loop redirects: a fault.
-        if ({fault} | (f_issues & {ends} & {ending})) f_over <= 1'b1;
+        if ({fault}) f_over <= 1'b1;
         if ({rst}) begin
             f_left <= 4'd{refill};
             f_squash <= 1'b1;
@@ -292,6 +287,7 @@ fn scoreboard(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
         );
     }
     let _ = writeln!(of.text, "        if ({rst}) f_{name}_booked <= {most}'d0;\n    end");
+    sure(plan, slot, of);
     for late in &slot.late {
         let u = busy(slot, late);
         let _ = writeln!(
@@ -302,6 +298,52 @@ fn scoreboard(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
             late.unit.interval - 1
         );
     }
+}
+
+/// Results that no fault cancels any more: a fault, reported two cycles after the bundle at fault has issued, cancels those of this bundle
+/// and of the next.
+fn sure(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
+    let (name, clk, rst, width, most) = (slot.name(), net::CLK, net::RST, plan.index, places(slot));
+    let issued = Decoded { slot, stage: Stage::Issue };
+    let count = slot.latencies.len().max(1);
+    let _ = writeln!(
+        of.text,
+        "    reg [{kinds}:0] f_{name}_new1, f_{name}_new2;
+    reg [{index}:0] f_{name}_dest1, f_{name}_dest2;
+    reg [{last}:0] f_{name}_sure, f_{name}_sure_now;
+    reg [{bits}:0] f_{name}_sure_register, f_{name}_sure_register_now;
+    always @* begin
+        f_{name}_sure_now = f_{name}_sure;
+        f_{name}_sure_register_now = f_{name}_sure_register;",
+        kinds = count - 1,
+        index = width - 1,
+        last = most - 1,
+        bits = most * width - 1,
+    );
+    for (number, latency) in slot.latencies.iter().enumerate() {
+        let place = latency - 2;
+        let _ = writeln!(
+            of.text,
+            "        if (f_{name}_new2[{number}] & ~{}) begin f_{name}_sure_now[{place}] = 1'b1; f_{name}_sure_register_now[{} +: {width}] = f_{name}_dest2; end",
+            net::FAULT,
+            place * width,
+        );
+    }
+    let _ = writeln!(
+        of.text,
+        "    end
+    always @(posedge {clk}) begin
+        f_{name}_new1 <= {{{count}{{f_issues}}}} & {};
+        f_{name}_dest1 <= {};
+        f_{name}_new2 <= f_{name}_new1;
+        f_{name}_dest2 <= f_{name}_dest1;
+        f_{name}_sure <= f_{name}_sure_now >> 1;
+        f_{name}_sure_register <= f_{name}_sure_register_now >> {width};
+        if ({rst}) begin f_{name}_new1 <= {count}'d0; f_{name}_new2 <= {count}'d0; f_{name}_sure <= {most}'d0; end
+    end",
+        issued.result(),
+        issued.dest()
+    );
 }
 
 /// Rules 2 to 6, and the decision.
@@ -333,8 +375,8 @@ fn decision(plan: &Plan, of: &mut Reference) {
     wire f_rule4 = ~{};
     wire f_rule5 = ~({drains} & {undrained});
     wire f_rule6 = ~{};
-    assign f_issues  = f_live & f_delivered & f_i_legal & f_rule2 & f_rule3 & f_rule4 & f_rule5 & f_rule6;
-    assign f_refuses = f_live & f_delivered & ~f_i_legal;
+    assign f_issues  = f_first & f_delivered & f_i_legal & f_rule2 & f_rule3 & f_rule4 & f_rule5 & f_rule6;
+    assign f_refuses = f_first & f_delivered & ~f_i_legal;
 
     // Cycles since the last issue, and those of them in which a legal bundle was there and did not issue.
     reg [5:0] f_quiet, f_waits;
@@ -356,13 +398,13 @@ fn decision(plan: &Plan, of: &mut Reference) {
 fn properties(plan: &Plan, of: &mut Reference) {
     of.promise(
         "a bundle issues in the cycle that the rules give, and in no other",
-        "f_live",
+        "f_first",
         &net::ISSUE.to_string(),
         "f_issues",
     );
     of.promise(
         "an illegal bundle is refused when it is delivered, and no other",
-        "f_live",
+        "f_first",
         &net::REFUSED.to_string(),
         "f_refuses",
     );

@@ -141,7 +141,7 @@ impl Source {
             r_is_next: inner(of, &instance, "r_is_next"),
             i_is_next: inner(of, &instance, "i_is_next"),
             read: in_read(of),
-            issue: format!("f_filled & {}", has(of, Stage::Issue)),
+            issue: format!("f_filled & ~{} & {}", net::FAULT, has(of, Stage::Issue)),
         }
     }
 
