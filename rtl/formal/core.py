@@ -70,7 +70,7 @@ def graph(folder, asked):
     """The core, reference, properties and invariants as gates and latches."""
     top = asked["top"]
     script = [f"read_verilog -lib {' '.join(asked['cut'])}", f"read_verilog -sv {' '.join(asked['read'])}"]
-    script += [f"hierarchy -check -top {top}", "proc", "flatten", f"cd {top}"]
+    script += [f"hierarchy -check -top {top}", "proc", "flatten", "memory_collect", f"memory_map {top}/sequencer.*", f"cd {top}"]
     script += [f"connect -nounset -set {name} {path}" for name, path in asked["inner"]]
     script += ["cd ..", "cutpoint -blackbox", f"delete -port {top}/o:*"]
     script += [f"expose {top}/w:{name}" for name in ("f_bad", "f_assumed", "f_issues")]
@@ -83,23 +83,31 @@ def graph(folder, asked):
     return read_aiger((folder / "core.aag").read_text())
 
 
-def decided(folder, core, certifier):
-    """Seconds of solving, bytes of the proofs, seconds of checking them; raises Failure if a condition can be 1."""
+def decided(folder, core, certifier=None):
+    """Seconds of solving, bytes of the proofs, seconds of checking them; raises Refuted if a condition can be 1."""
     total = [0.0, 0, 0.0]
     for name, gates, assumed, bad in core.questions():
         found = clauses(gates, assumed, bad)
-        if certifier:
-            certified = certifier.refute(numbered(found), name.replace(" ", "_"))
-            if certified is None:
-                raise Failure(broken(core, name, gates, assumed, bad))
-            total = [one + other for one, other in zip(total, certified)]
-        else:
+        certified = certifier.refute(numbered(found), name.replace(" ", "_")) if certifier else None
+        if certified is None:
             started = time.process_time()
             with Solver(name=SOLVER, bootstrap_with=found) as solver:
                 if solver.solve():
-                    raise Failure(broken(core, name, gates, assumed, bad))
-            total[0] += time.process_time() - started
+                    model = set(solver.get_model())
+                    raise Refuted(core.asked, name, [number for number, one in enumerate(bad) if literal(one) in model])
+            certified = time.process_time() - started, 0, 0.0
+        total = [one + other for one, other in zip(total, certified)]
     return total
+
+
+class Refuted(Failure):
+    """Conditions that can be 1 together; the text is for the user."""
+
+    def __init__(self, asked, name, numbers):
+        self.first = f"{name}: {asked['says'][numbers[0]]}"
+        lines = [f"{asked['machine']}: not proved; {name} there may be a breach of"]
+        lines += [f"  {asked['says'][number]}: {asked['bad'][number][:200]}" for number in numbers]
+        super().__init__("\n".join(lines))
 
 
 def numbered(found):
@@ -109,30 +117,16 @@ def numbered(found):
     return [[number(one) if one > 0 else -number(-one) for one in clause] for clause in found]
 
 
-def broken(core, name, gates, assumed, bad):
-    """The conditions that can be 1, as text."""
-    lines = [f"{core.asked['machine']}: not proved; {name} there may be a breach of"]
-    with Solver(name=SOLVER, bootstrap_with=clauses(gates, assumed)) as solver:
-        for out, left, right in needed(gates.ands, bad):
-            solver.append_formula(gate(out, left, right))
-        for number, one in enumerate(bad):
-            if solver.solve([literal(one)]):
-                lines.append(f"  {core.asked['says'][number]}: {core.asked['bad'][number][:200]}")
-    return "\n".join(lines)
-
-
 def refuted(folder, asked, name, fault):
-    """Whether the proof of a core with a fault (old, new) in a part fails."""
+    """The first condition that a fault (old, new) in a part breaks; None if the proof holds with it."""
     folder.mkdir(parents=True, exist_ok=True)
     texts = {file: (folder.parent / file).read_text() for file in [*asked["read"], *asked["cut"]]}
     for file, text in changed(texts, [f"{name}.v"], fault).items():
         (folder / file).write_text(text)
     try:
-        decided(folder, Core(folder, asked), None)
-    except Failure as failure:
-        if "not proved" not in str(failure):
-            raise
-        return str(failure).splitlines()[1].strip()
+        decided(folder, Core(folder, asked))
+    except Refuted as found:
+        return found.first
     return None
 
 

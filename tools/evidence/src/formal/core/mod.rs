@@ -10,6 +10,7 @@ mod decoded;
 mod effects;
 mod invariants;
 mod rules;
+mod sequence;
 mod values;
 
 use anyhow::{Context, Result, ensure};
@@ -46,6 +47,7 @@ pub(super) fn prove(venv: &Venv, design: &Design, way: &Way) -> Result<()> {
     let waits = rules::longest(plan);
     values::add(plan, &mut of);
     effects::add(plan, &mut of);
+    sequence::add(plan, &mut of);
     invariants::add(plan, &mut of);
     let (mut read, mut cut) = (Vec::new(), Vec::new());
     for file in &design.files {

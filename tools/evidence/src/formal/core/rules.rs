@@ -37,7 +37,7 @@ pub(super) struct Reference {
 impl Reference {
     /// Declares a net that stands for one within the core's parts, and returns its name.
     pub(super) fn seen(&mut self, path: &str, range: &str) -> String {
-        let name = format!("f_at_{}", path.replace('.', "_"));
+        let name = format!("f_at_{}", path.replace(['.', '[', ']'], "_"));
         if self.inner.iter().all(|(known, _)| *known != name) {
             let _ = writeln!(self.text, "    wire {range} {name};");
             self.inner.push((name.clone(), path.to_owned()));
