@@ -87,6 +87,8 @@ pub struct Models {
     pub mapped_table: MappedTable,
     /// Files of yosys' library that a mapped netlist needs, by their paths there.
     pub mapped_library: &'static [&'static str],
+    /// Proof that a mapped netlist equals the design; `None` if none is stated for the family.
+    pub equality: Option<Equality>,
 }
 
 impl Models {
@@ -94,6 +96,17 @@ impl Models {
     pub(crate) const fn if_wanted(self) -> Option<Models> {
         if cfg!(feature = "netlist") { Some(self) } else { None }
     }
+}
+
+/// Proof that a mapped netlist equals the design, without the cells for which both have the same.
+#[derive(Clone, Copy, Debug)]
+pub struct Equality {
+    /// yosys' commands that map the memories, and nothing else, of the designs read so far, given the top module.
+    pub memories: fn(&str) -> String,
+    /// Cells that are cut out of both netlists: memories and multipliers.
+    pub cut: &'static [&'static str],
+    /// Those among them, or pins of them as `CELL.PIN`, that outputs do not follow before the next edge of the clock.
+    pub clocked: &'static [&'static str],
 }
 
 /// Look-up table of four inputs, as yosys maps to it.

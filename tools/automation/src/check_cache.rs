@@ -119,9 +119,10 @@ const fn check(name: &'static str, command: &'static str, seconds: Option<f64>) 
 }
 
 /// Checks outside cargo's tests.
-pub const CHECKS: [Check; 12] = [
+pub const CHECKS: [Check; 13] = [
     check("formal", "cargo evidence check formal", Some(158.0)),
     check("units", "cargo evidence check units", Some(100.0)),
+    check("netlist", "cargo evidence check netlist", Some(120.0)),
     check(OPERANDS, "cargo evidence formal --units", Some(900.0)),
     check("clients", "cargo evidence check clients", None),
     check("litex", "cargo evidence check litex", None),

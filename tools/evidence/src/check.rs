@@ -2,7 +2,7 @@
 //! The command `cargo evidence check`: evidence that CI collects; each check is repeated only when its inputs change.
 
 use crate::threads::{at_once, cores};
-use crate::{boards, certificates, clients, fmu_windows, formal, linuxcnc, litex, routed};
+use crate::{boards, certificates, clients, fmu_windows, formal, linuxcnc, litex, netlist, routed};
 use anyhow::{Context, Result, ensure};
 use takt_automation::check_cache::{self, Inputs, LINUXCNC, OPERANDS};
 use takt_automation::command::install;
@@ -11,8 +11,8 @@ use takt_automation::progress;
 /// The checks to run.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// The checks by name, which then run even if they have passed with the same files; without names, formal, units, clients, litex and
-    /// certificates.
+    /// The checks by name, which then run even if they have passed with the same files; without names, formal, units, netlist, clients,
+    /// litex and certificates.
     names: Vec<String>,
     /// Run all, those that take longer too: placed and routed boards, a bitstream for each family, FMUs in Wine, LinuxCNC.
     #[arg(long, conflicts_with = "names")]
@@ -29,7 +29,7 @@ struct Share {
     run: fn() -> Result<()>,
 }
 
-const SHARES: [Share; 9] = [
+const SHARES: [Share; 10] = [
     Share {
         name: "formal",
         is_short: true,
@@ -37,6 +37,7 @@ const SHARES: [Share; 9] = [
         run: || formal::formal(&formal::Arguments::SHARE),
     },
     Share { name: "units", is_short: true, inputs: Some(formal::unit_inputs), run: formal::unit_share },
+    Share { name: "netlist", is_short: true, inputs: Some(netlist::inputs), run: netlist::share },
     Share { name: "clients", is_short: true, inputs: Some(clients::inputs), run: clients::test },
     Share { name: "litex", is_short: true, inputs: Some(litex::inputs), run: litex::test },
     Share {
@@ -106,15 +107,18 @@ mod tests {
     /// The hash that lets a proof be skipped covers all files that the proof reads.
     #[test]
     fn the_keys_of_proofs_cover_the_files_that_they_read() {
-        let [formal, units] =
-            [&SHARES[0], &SHARES[1]].map(|share| share.inputs.expect("files are known")().expect("inputs"));
+        let [formal, units, netlist] = [&SHARES[0], &SHARES[1], &SHARES[2]]
+            .map(|share| share.inputs.expect("files are known")().expect("inputs"));
         let folder = takt_automation::command::root().join("rtl/formal");
         for entry in std::fs::read_dir(folder).expect("rtl/formal") {
             let name = entry.expect("an entry").file_name().display().to_string();
             let path = format!("rtl/formal/{name}");
             // `mutants.py` is not a proof: it plants faults for `cargo evidence mutants`.
             if name != "mutants.py" && (name.ends_with(".py") || name.ends_with(".v")) {
-                assert!(formal.covers(&path) || units.covers(&path), "{path} is in no key");
+                assert!(
+                    [&formal, &units, &netlist].iter().any(|key| key.covers(&path)),
+                    "{path} is in no key"
+                );
             }
         }
         for path in ["rtl/units/add.v", "rtl/tests/faults.rs", "rtl/formal/prove.py", "isa/src/fp/mod.rs"] {

@@ -17,7 +17,7 @@ use anyhow::{Context, Result, ensure};
 use std::collections::BTreeSet;
 use std::fs;
 use takt_automation::check_cache::Inputs;
-use takt_automation::command::root;
+use takt_automation::command::{apt_install, root, works};
 use takt_automation::venv::{SAT, Venv, YOSYS, Z3};
 use takt_diagnostics::machine;
 use takt_family::{FAMILIES, Family, Proof};
@@ -155,6 +155,11 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
     calls(&venv)?;
     python(&venv, "motor", &[])?;
     loops(&venv, arguments)
+}
+
+/// Installs the program CaDiCaL if it lacks.
+pub(crate) fn cadical() -> Result<()> {
+    if works("cadical", "--version") { Ok(()) } else { apt_install(&["cadical"]) }
 }
 
 /// Runs a Python proof, `rtl/formal/NAME.py`.

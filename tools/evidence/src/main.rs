@@ -64,7 +64,8 @@ enum Task {
     Synth(synth::Arguments),
     /// Build a program on the boards, to the bitstream, and record resources and clock in docs/board.md.
     Boards(boards::Arguments),
-    /// Map a core to the cells of an FPGA and run the mapped netlist in lockstep with the emulator.
+    /// Map a core to the cells of an FPGA and run the mapped netlist in lockstep with the emulator; with --prove, prove that it equals the
+    /// Verilog.
     Netlist(netlist::Arguments),
     /// Let LinuxCNC, without a screen, cut agh.ngc with the hybrid robot on a simulated board, cut its link, stop it, and report
     /// (docs/linuxcnc.md; installs LinuxCNC, 2 GB, if it lacks).
@@ -111,7 +112,7 @@ fn task(task: Task) -> Result<()> {
         Task::Mutants(arguments) => mutants::mutants(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Boards(arguments) => boards::boards(&arguments),
-        Task::Netlist(arguments) => netlist::lockstep(&arguments),
+        Task::Netlist(arguments) => netlist::netlist(&arguments),
         Task::Linuxcnc(arguments) => linuxcnc::linuxcnc(&arguments),
         Task::Fpbench(arguments) => fpbench::compare(&arguments),
         Task::C(arguments) => c::count(&arguments),

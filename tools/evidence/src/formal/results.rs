@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Generated parts of `docs/verification.md`: proved properties of the units, from `rtl/formal/results.json`, and test modules with the
-//! first sentence of each.
+//! Generated parts of `docs/verification.md`: proved properties of units and mapped netlists, from `rtl/formal/results.json`, and test
+//! modules with the first sentence of each.
 
 mod page;
 
@@ -35,6 +35,7 @@ pub(crate) fn document() -> Result<(&'static str, String)> {
     let members: Vec<&str> = members.split('"').skip(1).step_by(2).collect();
     let whole = between(DOCUMENT, &text, ("proofs", "docs"), &table(&results))?;
     let whole = between(DOCUMENT, &whole, ("cores", "docs"), &cores(&results))?;
+    let whole = between(DOCUMENT, &whole, ("mapped", "docs"), &mapped(&results))?;
     let whole = between(DOCUMENT, &whole, ("tests", "docs"), &modules(&members)?)?;
     let rows = page::rows()?;
     let whole = ["units", "core", "tools", "programs"].into_iter().try_fold(whole, |whole, section| {
@@ -136,6 +137,39 @@ fn cores(results: &Value) -> String {
         );
     }
     text
+}
+
+/// Table of the mapped netlists that are proved to equal the Verilog, and list of the cells that were cut out of each.
+fn mapped(results: &Value) -> String {
+    let mut text = String::from(
+        "| machine | registers | mapped | merged | constant | unread | output bits | pins of cells cut out | equal by structure | proofs \
+         checked | planted faults refuted | changes that are none | on |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    let mut lists = String::new();
+    for (machine, of) in results["mapped"].as_object().into_iter().flatten() {
+        let numbers = ["registers", "mapped", "merged", "constant", "unread", "outputs", "pins", "structure"];
+        let numbers = numbers.map(|key| of[key].to_string()).join(" | ");
+        let [proofs, seconds, checking] = ["proofs", "seconds", "checking"].map(|key| of[key].to_string());
+        let size = of["bytes"].as_f64().unwrap_or_default() / 1e6;
+        let faults = |wanted: &[&str]| {
+            let kinds = of["mutants"].as_object().into_iter().flatten();
+            let counted = kinds.map(|(kind, of)| {
+                let count: u64 = wanted.iter().filter_map(|key| of[key].as_u64()).sum();
+                format!("{count} in {kind}")
+            });
+            counted.collect::<Vec<_>>().join(", ")
+        };
+        let (refuted, none) = (faults(&["refuted"]), faults(&["unused", "masked"]));
+        let date = of["date"].as_str().unwrap_or("–");
+        let _ = writeln!(
+            text,
+            "| {machine} | {numbers} | {proofs}: {size:.1} MB, {seconds} s, checking {checking} s | {refuted} | {none} | {date} |"
+        );
+        let cut = of["cut"].as_object().into_iter().flatten();
+        let cut = cut.map(|(name, count)| format!("`{name}` {}", count.as_str().unwrap_or_default()));
+        let _ = writeln!(lists, "\nCut out of {machine}: {}.", cut.collect::<Vec<_>>().join(", "));
+    }
+    text + &lists
 }
 
 /// Table of the units with their proofs.

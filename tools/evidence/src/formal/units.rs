@@ -4,7 +4,7 @@
 use super::Arguments;
 use anyhow::{Context, Result, bail, ensure};
 use takt_automation::check_cache::Inputs;
-use takt_automation::command::{apt_install, root, works};
+use takt_automation::command::root;
 use takt_automation::venv::{SAT, Venv, YOSYS};
 use takt_isa::{UNITS, Unit};
 
@@ -58,9 +58,7 @@ pub(super) fn prove(arguments: &Arguments, names: &[String], share: bool) -> Res
     command.args(share.then_some("--share")).args(arguments.again.then_some("--again"));
     command.args(arguments.verbose.then_some("--verbose"));
     if arguments.certify {
-        if !works("cadical", "--version") {
-            apt_install(&["cadical"])?;
-        }
+        super::cadical()?;
         command.arg("--certify").arg(&own);
     }
     for (option, value) in [("--only", &arguments.only), ("--cases", &arguments.cases)] {
