@@ -139,7 +139,7 @@ class Netlist:
                 self.cut[name] = cell
             elif kind != "$scopeinfo":
                 self.logic[name] = cell
-        if clocks != set(self.ports["clk"]["bits"]):
+        if not clocks <= set(self.ports["clk"]["bits"]):
             raise Failure(f"{path}: a register has another clock than the port `clk`")
         # Names and initial values by net; a name is the wire's and the number of the bit.
         self.names, self.initial = defaultdict(list), {}
@@ -299,8 +299,8 @@ class Comparison:
                         break
 
     def proposed(self):
-        """Counterparts of registers without one, by simulation: a constant that the register seems to keep, or a mapped register whose next
-        state seems to be the same. The proof decides. True if any was found."""
+        """Counterparts of registers without one, by simulation: a constant that the register seems to keep, or a mapped register, or its negation,
+        whose next state seems to be the same. The proof decides. True if any was found."""
         kept = lambda own, constant: lambda literal: constant if literal == own else literal
         for net, own in self.missing.items():
             next_state = self.before[0](self.source.registers[net])
@@ -312,7 +312,7 @@ class Comparison:
         # Of registers with the same next state, one that is no counterpart yet comes last, and so is taken.
         used = set(self.counterparts.values())
         states = sorted(self.next_states, key=lambda state: state not in used)
-        candidates = {value(self.next_states[state]): state for state in states}
+        candidates = {value(self.next_states[state] ^ negated): state ^ negated for negated in (1, 0) for state in states}
         for net in self.missing.keys() - self.counterparts.keys():
             state = candidates.get(value(self.before[0](self.source.registers[net])))
             if state is not None:
@@ -500,6 +500,7 @@ FAULTS = {"tables": wrong_table, "registers": wrong_register, "pins": wrong_pin,
 def refuted(source, mapped, clocked):
     """In words, where a mapped netlist with a fault differs; None if it is proved to equal the Verilog in spite of it."""
     try:
+        source, mapped = (Netlist(arguments.folder / f"{of}.json") for of in ("source", "gates"))
         comparison = Comparison(source, mapped, clocked)
         differences = comparison.differences()
         comparison.unread(differences)
@@ -554,8 +555,8 @@ def main():
     parser.add_argument("--verbose", action="store_true")
     arguments = parser.parse_args()
     name, clocked = arguments.name, set(arguments.clocked)
-    source, mapped = (Netlist(arguments.folder / f"{of}.json") for of in ("source", "gates"))
     try:
+        source, mapped = (Netlist(arguments.folder / f"{of}.json") for of in ("source", "gates"))
         comparison = Comparison(source, mapped, clocked)
         figures = prove(comparison, solve.Certifier(arguments.folder, arguments.checker), name)
         figures["cut"] = cut_out(source)

@@ -4,12 +4,15 @@
 //! yosys's own models translate cells back to Verilog; in lockstep, block RAMs and multipliers use the models for simulating a routed board
 //! ([`takt_family::Models`]). The proof, `rtl/formal/mapped.py`, cuts them out.
 
+mod refusals;
+
 use crate::formal;
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 use takt_automation::check_cache::Inputs;
 use takt_automation::command::root;
 use takt_automation::progress;
@@ -80,13 +83,13 @@ pub(crate) fn inputs() -> Result<Inputs> {
         .try_fold(Inputs::default().and((design, equality, synthesis, own)), Inputs::files)
 }
 
-/// Runs the proof of the test suite.
+/// Runs the proof of the test suite, and compares small circuits.
 pub(crate) fn share() -> Result<()> {
     let (machine, mutants) = SHARE;
-    prove(
-        &Arguments { machine: machine.to_owned(), programs: 0, prove: true, mutants, verbose: false },
-        false,
-    )
+    refusals::refuse(&Venv::with(&[YOSYS, SAT])?)?;
+    let arguments =
+        Arguments { machine: machine.to_owned(), programs: 0, prove: true, mutants, verbose: false };
+    prove(&arguments, false)
 }
 
 /// A machine's core, and the family whose cells it is mapped to.
@@ -242,29 +245,40 @@ fn prove(arguments: &Arguments, is_recorded: bool) -> Result<()> {
     let mapped = core.map(Venv::with(&[YOSYS, SAT])?)?;
     let cells = mapped.reduce(true)?;
     let top = &mapped.core.design.top;
-    // Tables stay whole, which keeps the netlist small.
-    let gates = |netlist: &str| {
-        format!(
-            "opt_clean\ndffunmap\ntechmap t:$lut %n\nsimplemap t:$lut %n\nclean\nblackbox =A:whitebox\n\
-             hierarchy -purge_lib -top {top}\nwrite_json {netlist}\n"
-        )
-    };
     let memories = (equality.memories)(top);
     mapped.yosys(
         "gates of the Verilog",
         "source.ys",
-        format!("{}{memories}\n{}", mapped.read, gates("source.json")),
+        format!("{}{memories}\n{}", mapped.read, gates(top, "source.json")),
     )?;
-    mapped.yosys("gates of the netlist", "gates.ys", mapped.back(equality.cut) + &gates("gates.json"))?;
+    mapped.yosys(
+        "gates of the netlist",
+        "gates.ys",
+        mapped.back(equality.cut) + &gates(top, "gates.json"),
+    )?;
     println!("{name}: mapped to the cells of {family}: {cells}");
-    let mut command = mapped.venv.command("python3")?;
-    command.arg(root().join("rtl/formal/mapped.py")).arg(&mapped.folder).args(["--name", name]);
+    let mut command = python(&mapped.venv, &mapped.folder, name)?;
     command.args(["--mutants", &arguments.mutants.to_string()]);
-    command.arg("--checker").arg(std::env::current_exe().context("this program's file is unknown")?);
     command.args(is_recorded.then_some("--record")).args(arguments.verbose.then_some("--verbose"));
     command.arg("--clocked").args(equality.clocked);
     let status =
         progress::step(&format!("{name}: proof"), || command.status().context("cannot start python3"))?;
     ensure!(status.success(), "the netlist of {name} is not proved to equal the Verilog ({status})");
     Ok(())
+}
+
+/// yosys' commands that write a netlist of gates, registers and boxes. Tables stay whole, which keeps the netlist small.
+fn gates(top: &str, netlist: &str) -> String {
+    format!(
+        "opt_clean\ndffunmap\ntechmap t:$lut %n\nsimplemap t:$lut %n\nclean\nblackbox =A:whitebox\n\
+         hierarchy -purge_lib -top {top}\nwrite_json {netlist}\n"
+    )
+}
+
+/// Command that compares the netlists in a folder, `source.json` and `gates.json`.
+fn python(venv: &Venv, folder: &Path, name: &str) -> Result<Command> {
+    let mut command = venv.command("python3")?;
+    command.arg(root().join("rtl/formal/mapped.py")).arg(folder).args(["--name", name]);
+    command.arg("--checker").arg(std::env::current_exe().context("this program's file is unknown")?);
+    Ok(command)
 }
