@@ -246,6 +246,15 @@ class Comparison:
         while self.proposed():
             self.evaluate_source()
 
+    def changed(self, mapped):
+        """The comparison with a mapped netlist that has the same registers and cells. Literals mean the same in both, so that what is proved of
+        one here need not be proved there."""
+        other = copy.copy(self)
+        other.mapped = mapped
+        other.same_cells()
+        other.evaluate_mapped()
+        return other
+
     def same_cells(self):
         """Ports are the same, and so are names, types, parameters and connected pins of the cells that are cut out."""
         cells = lambda side: {name: (cell["type"], cell["parameters"], sorted(cell["connections"])) for name, cell in side.cut.items()}
@@ -497,28 +506,29 @@ def wrong_contents(comparison, chance):
 FAULTS = {"tables": wrong_table, "registers": wrong_register, "pins": wrong_pin, "contents": wrong_contents}
 
 
-def refuted(source, mapped, clocked):
-    """In words, where a mapped netlist with a fault differs; None if it is proved to equal the Verilog in spite of it."""
+def refuted(comparison, faulty):
+    """In words, where a mapped netlist with a fault differs; None if it is proved to equal the Verilog in spite of it, as the one without."""
+    proved = {literal for bits in comparison.differences().values() for literal in bits.values()}
     try:
-        source, mapped = (Netlist(arguments.folder / f"{of}.json") for of in ("source", "gates"))
-        comparison = Comparison(source, mapped, clocked)
-        differences = comparison.differences()
-        comparison.unread(differences)
+        changed = comparison.changed(faulty)
+        differences = changed.differences()
+        changed.unread(differences)
     except Failure as failure:
         return str(failure)
-    value = comparison.logic.simulate(PATTERNS)
-    for (kind, name), bits in differences.items():
+    left = {key: {bit: literal for bit, literal in bits.items() if literal not in proved} for key, bits in differences.items()}
+    value = changed.logic.simulate(PATTERNS)
+    for (kind, name), bits in left.items():
         wrong = [bit for bit, literal in bits.items() if value(literal)]
         if wrong:
             return differing(kind, name, wrong)
-    for (kind, name), bits in differences.items():
-        text = any(bits.values()) and counterexample(question(comparison.logic, bits), kind, name)
+    for (kind, name), bits in left.items():
+        text = bits and counterexample(question(changed.logic, bits), kind, name)
         if text:
             return text
     return None
 
 
-def mutants(comparison, clocked, count, what, verbose):
+def mutants(comparison, count, what, verbose):
     """Plants faults until so many of each kind are refuted. By kind: how many were, how many changes are no fault because the place is never
     used, and how many because nothing depends on it."""
     chance = random.Random(1)
@@ -530,7 +540,7 @@ def mutants(comparison, clocked, count, what, verbose):
             if sum(of.values()) > 10 * count:
                 raise Failure(f"of {sum(of.values())} faults in {kind}, {of['refuted']} are refuted")
             text, faulty, matters = plant(comparison, chance)
-            how = refuted(comparison.source, faulty, clocked)
+            how = refuted(comparison, faulty)
             if how:
                 outcome, how = "refuted", f"refuted: {how}"
             elif comparison.logic.question({"bad": matters}).counterexample() is None:
@@ -568,7 +578,7 @@ def main():
         for cell, count in figures["cut"].items():
             print(f"{name}: cut out: {cell}: {count}", flush=True)
         if arguments.mutants:
-            figures["mutants"] = mutants(comparison, clocked, arguments.mutants, name, arguments.verbose)
+            figures["mutants"] = mutants(comparison, arguments.mutants, name, arguments.verbose)
             for kind, of in figures["mutants"].items():
                 print("{}: planted in {}: {refuted} refuted; no faults: {unused} never used, {masked} masked".format(name, kind, **of))
     except Failure as failure:
