@@ -36,7 +36,7 @@ pub(crate) struct Arguments {
     #[arg(long, conflicts_with = "programs")]
     prove: bool,
     /// Of the proof: planted faults to refute, N of each kind.
-    #[arg(long, default_value_t = 0, value_name = "N", requires = "prove")]
+    #[arg(long, default_value_t = 20, value_name = "N", requires = "prove")]
     mutants: usize,
     /// How each planted fault was refuted.
     #[arg(long, requires = "prove")]
@@ -64,23 +64,21 @@ pub(crate) fn netlist(arguments: &Arguments) -> Result<()> {
 /// Inputs of the proof in the test suite: circuit, cells, scripts, tools.
 pub(crate) fn inputs() -> Result<Inputs> {
     let core = Core::of(SHARE.0)?;
+    let (top, models) = (&core.design.top, core.models);
     let design: Vec<_> = core.files().map(|file| (file.name.clone(), file.text.clone())).collect();
-    let equality = core.models.equality.map(|equality| ((equality.memories)(&core.design.top), equality.cut));
-    let synthesis = (core.synthesis.commands)(&core.design.top, "", Mapping::of(core.machine));
-    let own = (
-        include_str!("netlist.rs"),
-        YOSYS,
-        SAT,
-        SHARE,
-        core.synthesis.files,
-        core.models.mapped_table.techmap(),
-    );
-    let files = ["mapped.py", "solve.py", "circuit.py"].map(|name| format!("rtl/formal/{name}"));
-    files
-        .iter()
-        .map(String::as_str)
-        .chain(["tools/evidence/src/formal/drat.rs"])
-        .try_fold(Inputs::default().and((design, equality, synthesis, own)), Inputs::files)
+    let commands = (core.synthesis.commands)(top, "", Mapping::of(core.machine));
+    let equality = models.equality.map(|equality| ((equality.memories)(top), equality.cut, equality.clocked));
+    let cells = (models.cells, models.mapped_library, models.mapped_table.techmap());
+    let own = (include_str!("netlist.rs"), include_str!("netlist/refusals.rs"), YOSYS, SAT, SHARE);
+    let key = Inputs::default().and((design, core.synthesis.files, commands, equality, cells, own));
+    [
+        "rtl/formal/mapped.py",
+        "rtl/formal/solve.py",
+        "rtl/formal/circuit.py",
+        "tools/evidence/src/formal/drat.rs",
+    ]
+    .into_iter()
+    .try_fold(key, Inputs::files)
 }
 
 /// Runs the proof of the test suite, and compares small circuits.
@@ -174,7 +172,7 @@ impl Mapped {
     fn back(&self, boxes: &[&str]) -> String {
         let (models, top) = (self.core.models, &self.core.design.top);
         let library: String = models.mapped_library.iter().map(|path| format!(" +/{path}")).collect();
-        let boxes: String = boxes.iter().map(|cell| format!("blackbox {cell}\n")).collect();
+        let boxes: String = boxes.iter().map(|cell| format!("blackbox ={cell}\n")).collect();
         format!(
             "read_json top.json\ntechmap -map table.v\nread_verilog{library}\nread_verilog -lib cells.v\n{boxes}\
              hierarchy -check -top {top}\nproc\nflatten\n"
