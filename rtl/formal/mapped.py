@@ -216,11 +216,11 @@ def ordered(netlists, clocked):
             drives[net] = name
         for name, cell in netlist.logic.items():
             inputs = [net for pin, nets in cell["connections"].items() if pin != "Y" for net in nets]
-            before[side, name] = {drives[net] for net in inputs if net in drives}
+            before[side, name] = [drives[net] for net in inputs if net in drives]
         for (name, pin, _), net in netlist.pins("input"):
             kind = netlist.cut[name]["type"]
             if not {kind, f"{kind}.{pin}"} & clocked and net in drives:
-                before.setdefault(name, set()).add(drives[net])
+                before.setdefault(name, []).append(drives[net])
     try:
         order = [node for node in TopologicalSorter(before).static_order() if isinstance(node, tuple)]
     except CycleError as error:
@@ -506,16 +506,17 @@ def wrong_contents(comparison, chance):
 FAULTS = {"tables": wrong_table, "registers": wrong_register, "pins": wrong_pin, "contents": wrong_contents}
 
 
-def refuted(comparison, faulty):
-    """In words, where a mapped netlist with a fault differs; None if it is proved to equal the Verilog in spite of it, as the one without."""
-    proved = {literal for bits in comparison.differences().values() for literal in bits.values()}
+def refuted(comparison, proved, faulty):
+    """In words, where a mapped netlist with a fault differs; None if it is proved to equal the Verilog in spite of it, given the literals that
+    are proved to be 0 without."""
     try:
         changed = comparison.changed(faulty)
-        differences = changed.differences()
-        changed.unread(differences)
+        left = {
+            key: {bit: literal for bit, literal in bits.items() if literal not in proved} for key, bits in changed.differences().items()
+        }
+        changed.unread(left)
     except Failure as failure:
         return str(failure)
-    left = {key: {bit: literal for bit, literal in bits.items() if literal not in proved} for key, bits in differences.items()}
     value = changed.logic.simulate(PATTERNS)
     for (kind, name), bits in left.items():
         wrong = [bit for bit, literal in bits.items() if value(literal)]
@@ -532,6 +533,7 @@ def mutants(comparison, count, what, verbose):
     """Plants faults until so many of each kind are refuted. By kind: how many were, how many changes are no fault because the place is never
     used, and how many because nothing depends on it."""
     chance = random.Random(1)
+    proved = {literal for bits in comparison.differences().values() for literal in bits.values()}
     progress = Progress(f"{what}: planted faults", count * len(FAULTS))
     found = {}
     for kind, plant in FAULTS.items():
@@ -540,7 +542,7 @@ def mutants(comparison, count, what, verbose):
             if sum(of.values()) > 10 * count:
                 raise Failure(f"of {sum(of.values())} faults in {kind}, {of['refuted']} are refuted")
             text, faulty, matters = plant(comparison, chance)
-            how = refuted(comparison, faulty)
+            how = refuted(comparison, proved, faulty)
             if how:
                 outcome, how = "refuted", f"refuted: {how}"
             elif comparison.logic.question({"bad": matters}).counterexample() is None:
