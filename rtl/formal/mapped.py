@@ -308,8 +308,8 @@ class Comparison:
                         break
 
     def proposed(self):
-        """Counterparts of registers without one, by simulation: a constant that the register seems to keep, or a mapped register, or its negation,
-        whose next state seems to be the same. The proof decides. True if any was found."""
+        """Counterparts of registers without one, by simulation: a constant that the register seems to keep, or a mapped register, or its
+        negation, whose next state seems to be the same. The proof decides. True if any was found."""
         kept = lambda own, constant: lambda literal: constant if literal == own else literal
         for net, own in self.missing.items():
             next_state = self.before[0](self.source.registers[net])
@@ -573,8 +573,8 @@ def main():
         figures = prove(comparison, solve.Certifier(arguments.folder, arguments.checker), name)
         figures["cut"] = cut_out(source)
         print(
-            "{}: equal: next states of {registers} registers ({mapped} mapped: {merged} merged with others, {constant} constant, {unread} read by "
-            "nothing), {outputs} output bits, {pins} inputs of cells cut out; {structure} bits by structure, the others by {proofs} proofs "
+            "{}: equal: next states of {registers} registers ({mapped} mapped: {merged} merged with others, {constant} constant, {unread} read "
+            "by nothing), {outputs} output bits, {pins} inputs of cells cut out; {structure} bits by structure, the others by {proofs} proofs "
             "({bytes} bytes), {seconds} s, checked in {checking} s".format(name, **figures)
         )
         for cell, count in figures["cut"].items():
