@@ -479,9 +479,9 @@ def wrong_register(comparison, chance):
 
 
 def wrong_pin(comparison, chance):
-    """An input of a cell that is cut out is constant; a constant input has the other value."""
+    """An input of a cell that is cut out is constant; a constant input has the other value. No input is chosen that is undefined anyway."""
     netlist = comparison.mapped
-    (name, pin, i), net = chance.choice(sorted(netlist.pins("input"), key=str))
+    (name, pin, i), net = chance.choice(sorted((pin for pin in netlist.pins("input") if pin[1] != "x"), key=str))
     cell = netlist.cut[name]
     nets = [*cell["connections"][pin]]
     nets[i] = "1" if net == "0" else "0"
