@@ -318,15 +318,34 @@ class Comparison:
                     self.counterparts[net] = constant
                     break
         value = self.logic.simulate(PATTERNS)
-        # Of registers with the same next state, one that is no counterpart yet comes last, and so is taken.
-        used = set(self.counterparts.values())
-        states = sorted(self.next_states, key=lambda state: state not in used)
-        candidates = {value(self.next_states[state] ^ negated): state ^ negated for negated in (1, 0) for state in states}
-        for net in self.missing.keys() - self.counterparts.keys():
-            state = candidates.get(value(self.before[0](self.source.registers[net])))
-            if state is not None:
-                self.counterparts[net] = state
+        alike = defaultdict(list)
+        for state, next_state in self.next_states.items():
+            for negated in (0, 1):
+                alike[value(next_state ^ negated)].append(state ^ negated)
+        candidates = {net: alike[value(self.before[0](self.source.registers[net]))] for net in self.missing.keys() - self.counterparts.keys()}
+        # Mapped registers with the same next state may differ in the first cycle: the one that is read in the same places is meant.
+        read, used = self.read_together(candidates), set(self.counterparts.values())
+        for net, states in candidates.items():
+            if states:
+                self.counterparts[net] = max(states, key=lambda state: (read[net, state], state not in used))
         return bool(self.missing.keys() & self.counterparts.keys())
+
+    def read_together(self, candidates):
+        """How many bits depend on a register in the Verilog, and on a candidate for it in the mapped netlist."""
+        marked = {self.missing[net] for net in candidates} | {state & ~1 for states in candidates.values() for state in states}
+        marks = {literal: 1 << i for i, literal in enumerate(sorted(marked))}
+        # Obligations add gates.
+        obligations = [(self.before[0](net), literal) for _, net, literal in self.obligations()]
+        depends = [0]
+        for variable, node in enumerate(self.logic.nodes[1:], 1):
+            depends.append(depends[node[0] >> 1] | depends[node[1] >> 1] if isinstance(node, tuple) else marks.get(2 * variable, 0))
+        found = Counter()
+        for literals in obligations:
+            in_source, in_mapped = (depends[literal >> 1] for literal in literals)
+            for register in candidates if in_source and in_mapped else ():
+                if in_source & marks[self.missing[register]]:
+                    found.update((register, state) for state in candidates[register] if in_mapped & marks[state & ~1])
+        return found
 
     def bases(self):
         """Registers whose initial values differ from those of their counterparts."""

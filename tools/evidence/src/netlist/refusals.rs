@@ -20,7 +20,7 @@ struct Case {
 const BOX: &str = "(* blackbox *) module cut(input i, output o); endmodule\n";
 const PORTS: &str = "module top(input clk, input other, input a, input b, output y);\n";
 
-const CASES: [Case; 13] = [
+const CASES: [Case; 14] = [
     Case {
         name: "merged, inverted and undefined values",
         source: "reg q, r, s, t; always @(posedge clk) begin q <= a; r <= a; s <= ~b; t <= a ? b : 1'bx; end assign y = q & r ^ s ^ t;",
@@ -31,6 +31,12 @@ const CASES: [Case; 13] = [
         name: "a register without its name",
         source: "reg q; always @(posedge clk) q <= a & b; assign y = q;",
         gates: "reg p; always @(posedge clk) p <= ~(~a | ~b); assign y = p;",
+        refusal: "",
+    },
+    Case {
+        name: "registers without names and with the same next state",
+        source: "reg q, r, t; always @(posedge clk) begin q <= a; r <= a; t <= q & b; end assign y = r ^ t;",
+        gates: "reg m, n, t; always @(posedge clk) begin m <= a; n <= a; t <= n & b; end assign y = m ^ t;",
         refusal: "",
     },
     Case {
