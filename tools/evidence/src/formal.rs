@@ -14,7 +14,6 @@ pub(crate) use enumerate::{Arguments as EnumerateArguments, enumerate};
 pub(crate) use tables::tables;
 
 use anyhow::{Context, Result, ensure};
-use std::collections::BTreeSet;
 use std::fs;
 use takt_automation::check_cache::Inputs;
 use takt_automation::command::{apt_install, root, works};
@@ -31,9 +30,6 @@ pub(crate) struct Arguments {
     /// The machine, by its name or a file with its row (`my.toml`); every one of the table unless stated.
     #[arg(long)]
     machine: Option<String>,
-    /// Cycles after reset for which it is proved that what issues around counted loops is what the program means.
-    #[arg(long, default_value_t = 22)]
-    loops: u32,
     /// Prove arithmetic units instead, these or all: pipeline, results and flags for all operands, and that planted faults are refuted.
     /// Stopped, it goes on where it was.
     #[arg(long, num_args = 0.., value_name = "NAME", conflicts_with = "machine")]
@@ -41,8 +37,7 @@ pub(crate) struct Arguments {
     /// Of units: cases decided side by side.
     #[arg(long, default_value_t = 1, requires = "units")]
     jobs: usize,
-    /// Planted faults to refute in loops, in units, or in a core's parts (of t1, or of the machine that is stated), the first N of each;
-    /// 0 for all.
+    /// Planted faults to refute in units, or in a core's parts (of t1, or of the machine that is stated), the first N of each; 0 for all.
     #[arg(long, default_value_t = 0, value_name = "N")]
     mutants: usize,
     /// Of units: one proof alone, such as fused.sum, or timing, or mutants.
@@ -67,7 +62,6 @@ impl Arguments {
     /// Proofs in the test suite: every machine to a depth that takes seconds; for each unit the short proofs, and one planted fault.
     pub(crate) const SHARE: Arguments = Arguments {
         machine: None,
-        loops: 18,
         units: None,
         jobs: 1,
         mutants: 1,
@@ -93,13 +87,9 @@ pub(crate) fn unit_share() -> Result<()> {
 pub(crate) fn inputs(arguments: &Arguments) -> Result<Inputs> {
     let library = Library::load(&root().join("rtl/units"))?;
     let own = Inputs::default()
-        .and((include_str!("formal.rs"), YOSYS, Z3, SAT, arguments.loops))
+        .and((include_str!("formal.rs"), YOSYS, Z3, SAT))
         .files("tools/evidence/src/formal/core")?;
     let files = [
-        "calls.py",
-        "calls.v",
-        "loops.py",
-        "loops.v",
         "motor.py",
         "phase.v",
         "trip.v",
@@ -139,10 +129,7 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
         Some(name) => vec![machine::machine(name).map_err(anyhow::Error::msg)?],
         None => MACHINES.to_vec(),
     };
-    for (family, proof) in FAMILIES.iter().filter_map(|family| Some((family, family.bank.as_ref()?))) {
-        bank(&venv, &export(machines[0], &library)?, family, proof)?;
-    }
-    for machine in machines {
+    for machine in &machines {
         let is_table = MACHINES.iter().any(|row| row.name == machine.name);
         let way = core::Way {
             certify: arguments.certify,
@@ -152,9 +139,13 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
         };
         core::prove(&venv, &export(machine, &library)?, &way)?;
     }
-    calls(&venv)?;
-    python(&venv, "motor", &[])?;
-    loops(&venv, arguments)
+    if arguments.machine.is_some() {
+        return Ok(());
+    }
+    for (family, proof) in FAMILIES.iter().filter_map(|family| Some((family, family.bank.as_ref()?))) {
+        bank(&venv, &export(machines[0], &library)?, family, proof)?;
+    }
+    motor(&venv)
 }
 
 /// Installs the program CaDiCaL if it lacks.
@@ -162,29 +153,13 @@ pub(crate) fn cadical() -> Result<()> {
     if works("cadical", "--version") { Ok(()) } else { apt_install(&["cadical"]) }
 }
 
-/// Runs a Python proof, `rtl/formal/NAME.py`.
-fn python(venv: &Venv, name: &str, options: &[String]) -> Result<()> {
+/// Proves half bridges and trips of a board.
+fn motor(venv: &Venv) -> Result<()> {
     let mut command = venv.command("python3")?;
-    command.arg(root().join(format!("rtl/formal/{name}.py")));
-    command.arg("--folder").arg(root().join("target/formal").join(name)).args(options);
+    command.arg(root().join("rtl/formal/motor.py")).arg("--folder").arg(root().join("target/formal/motor"));
     let status = command.status().context("cannot start python3")?;
-    ensure!(status.success(), "{name} are not proved ({status})");
+    ensure!(status.success(), "half bridges are not proved ({status})");
     Ok(())
-}
-
-/// Proves return targets, and the faults of calls and returns, at the return-stack depth of every machine.
-fn calls(venv: &Venv) -> Result<()> {
-    let depths: BTreeSet<u32> = MACHINES.iter().map(|machine| machine.stack_depth).collect();
-    let depths = depths.iter().map(u32::to_string);
-    python(venv, "calls", &["--depths".to_owned()].into_iter().chain(depths).collect::<Vec<_>>())
-}
-
-/// Proves that operations issue correctly around counted loops.
-fn loops(venv: &Venv, arguments: &Arguments) -> Result<()> {
-    let numbers = [("--cycles", u64::from(arguments.loops)), ("--mutants", arguments.mutants as u64)];
-    let options = numbers.into_iter().flat_map(|(option, number)| [option.to_owned(), number.to_string()]);
-    let verbose = arguments.verbose.then(|| "--verbose".to_owned());
-    python(venv, "loops", &options.chain(verbose).collect::<Vec<_>>())
 }
 
 /// Proves pin by pin, including output registers, that a family's bank equals the block RAM that yosys infers from the general bank.

@@ -3,7 +3,7 @@
 //! (`rtl/formal/core.py`).
 //!
 //! Units, banks, program and data memory are cut out and their outputs left arbitrary, and with them the program and all values. The
-//! reference and the properties ([`rules`], [`values`], [`effects`]) are generated from the machine's row and the table of instructions;
+//! reference and the properties ([`rules`], [`sequence`], [`values`], [`effects`]) are generated from the machine's row and the table of instructions;
 //! the [`invariants`] say what each register of the core means in terms of the reference.
 
 mod decoded;
@@ -15,7 +15,7 @@ mod values;
 
 use anyhow::{Context, Result, ensure};
 use std::fs;
-use takt_automation::command::{apt_install, root, works};
+use takt_automation::command::root;
 use takt_automation::venv::Venv;
 use takt_rtl::Design;
 
@@ -72,9 +72,7 @@ pub(super) fn prove(venv: &Venv, design: &Design, way: &Way) -> Result<()> {
     let mut command = venv.command("python3")?;
     command.arg(root().join("rtl/formal/core.py")).arg("--folder").arg(&folder);
     if way.certify {
-        if !works("cadical", "--version") {
-            apt_install(&["cadical"])?;
-        }
+        super::cadical()?;
         command.arg("--certify").arg(std::env::current_exe().context("this program's file is unknown")?);
     }
     if let Some(mutants) = way.mutants {
