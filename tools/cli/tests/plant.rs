@@ -287,6 +287,25 @@ fn a_program_without_inputs_is_told_its_plant() {
     assert!(done.starts_with("400 periods on t3"), "{done}");
 }
 
+/// A table beside a plant needs no column for what the plant or its file gives; one that belongs to no port may be a misspelt name.
+#[test]
+fn a_misspelt_column_beside_a_plant_is_told() {
+    let folder = Folder::new();
+    let (program, plant) =
+        (format!("{}/../pi.s", example().display()), format!("{}/dc_motor.toml", example().display()));
+    let note = |title: &str| {
+        folder.write("inputs.csv", &format!("{title}\n1\n1\n"));
+        folder.line(&format!("run {program} --plant {plant} --inputs inputs.csv")).stderr
+    };
+    let passed = "note: inputs.csv: the column";
+    assert_eq!(note("w_ref"), "");
+    assert!(note("w_rf").starts_with(&format!("{passed} `w_rf` belongs to no input port")));
+    assert!(note("w_rf").contains("did you mean `w_ref`?"));
+    // A signal of the recording that no port has.
+    assert!(note("u").starts_with(&format!("{passed} `u` belongs to no input port")));
+    assert!(!note("u").contains("did you mean"));
+}
+
 /// The picture of a run from a table has its inputs, too, and the output table has not.
 #[test]
 fn a_picture_from_a_table_shows_its_inputs() {

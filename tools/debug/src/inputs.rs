@@ -77,6 +77,8 @@ pub struct Table {
     row: Row,
     /// No row has been read yet.
     begins: bool,
+    /// Columns that belong to no port, where a port that may have one has none.
+    note: Option<String>,
 }
 
 /// Maximum size of a row in bytes: a file without line ends, or with an unclosed quote, must not fill the memory.
@@ -119,7 +121,13 @@ impl Table {
             let missing = missing.join(", ");
             return Err(format!("{name}: no column for the {ports} {missing}{near}{separator}{quoted}"));
         }
-        Ok(Table::with(name, reader, &header, found))
+        let note = passed_over(&name, &header, &all, &found);
+        Ok(Table { note, ..Table::with(name, reader, &header, found) })
+    }
+
+    /// Note on columns that belong to no port, while a port that may have a column has none: one of them may be its misspelt name.
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
     }
 
     /// Reads the header of a table that may omit ports but has no other columns. `name` identifies the table in messages.
@@ -145,7 +153,7 @@ impl Table {
         ports: Vec<(Port, usize)>,
     ) -> Table {
         let (record, row) = (csv::StringRecord::new(), Row::new());
-        Table { name, reader, record, width: header.len(), ports, row, begins: true }
+        Table { name, reader, record, width: header.len(), ports, row, begins: true, note: None }
     }
 
     /// Name of the table in messages.
@@ -241,6 +249,35 @@ impl<'a> OpenTable<'a> {
         }
         Ok(OpenTable { reader, header, found, missing })
     }
+}
+
+/// Note on the columns that belong to none of the ports; `None` if there are none, or if each port has a column.
+fn passed_over(
+    name: &str,
+    header: &csv::StringRecord,
+    ports: &[Port],
+    found: &[(Port, usize)],
+) -> Option<String> {
+    let others: Vec<&str> =
+        header.iter().filter(|title| ports.iter().all(|port| port.name != **title)).collect();
+    let absent = || {
+        let has = |port: &Port| found.iter().any(|(other, _)| other.name == port.name);
+        ports.iter().filter(move |port| !has(port)).map(|port| port.name.as_str())
+    };
+    let (first, _) = (others.first()?, absent().next()?);
+    let near = others.iter().find_map(|title| nearest(title, absent()).map(|near| (title, near)));
+    let near = match near {
+        Some((title, near)) if others.len() > 1 => {
+            format!("; is `{}` meant to be `{near}`?", field_start(title))
+        }
+        Some((_, near)) => format!("; did you mean `{near}`?"),
+        None => String::new(),
+    };
+    let columns = match others.len() {
+        1 => format!("the column `{}` belongs to no input port and is", field_start(first)),
+        count => format!("{count} columns belong to no input port (`{}`, …) and are", field_start(first)),
+    };
+    Some(format!("{name}: {columns} passed over{near}"))
 }
 
 /// Hint for a row that seems to use a separator other than the comma.

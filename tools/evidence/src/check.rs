@@ -33,7 +33,7 @@ const SHARES: [Share; 10] = [
     Share {
         name: "formal",
         is_short: true,
-        inputs: Some(|| formal::inputs(&formal::Arguments::SHARE)),
+        inputs: Some(formal::inputs),
         run: || formal::formal(&formal::Arguments::SHARE),
     },
     Share { name: "units", is_short: true, inputs: Some(formal::unit_inputs), run: formal::unit_share },

@@ -37,9 +37,10 @@ pub(crate) struct Arguments {
     /// Of units: cases decided side by side.
     #[arg(long, default_value_t = 1, requires = "units")]
     jobs: usize,
-    /// Planted faults to refute in units, or in a core's parts (of t1, or of the machine that is stated), the first N of each; 0 for all.
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    mutants: usize,
+    /// Planted faults to refute in each unit, or in each part of t1 or of the machine that is stated, the first N; 0 for all. Without it,
+    /// all in units and in t1.
+    #[arg(long, value_name = "N")]
+    mutants: Option<usize>,
     /// Of units: one proof alone, such as fused.sum, or timing, or mutants.
     #[arg(long, value_name = "PROOF", requires = "units")]
     only: Option<String>,
@@ -64,7 +65,7 @@ impl Arguments {
         machine: None,
         units: None,
         jobs: 1,
-        mutants: 1,
+        mutants: Some(1),
         only: None,
         cases: None,
         again: false,
@@ -84,7 +85,7 @@ pub(crate) fn unit_share() -> Result<()> {
 }
 
 /// Inputs of the proofs: circuits, depth, tools.
-pub(crate) fn inputs(arguments: &Arguments) -> Result<Inputs> {
+pub(crate) fn inputs() -> Result<Inputs> {
     let library = Library::load(&root().join("rtl/units"))?;
     let own = Inputs::default()
         .and((include_str!("formal.rs"), YOSYS, Z3, SAT))
@@ -133,7 +134,10 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
         let is_table = MACHINES.iter().any(|row| row.name == machine.name);
         let way = core::Way {
             certify: arguments.certify,
-            mutants: (arguments.machine.is_some() || machine.name == T1.name).then_some(arguments.mutants),
+            mutants: match arguments.mutants {
+                Some(count) if arguments.machine.is_some() => Some(count),
+                count => (machine.name == T1.name).then_some(count.unwrap_or(0)),
+            },
             verbose: arguments.verbose,
             record: arguments.certify && is_table,
         };

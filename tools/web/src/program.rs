@@ -139,8 +139,9 @@ impl Playground {
             .cloned()
             .partition(|port| given.iter().any(|other| other.name == port.name));
         let source = Box::new(Cursor::new(table.to_vec()));
-        let others = Table::with_optional(INPUTS.to_owned(), source, &needed, &optional).err();
-        let others = others.filter(|_| !is_blank);
+        let table_read = Table::with_optional(INPUTS.to_owned(), source, &needed, &optional);
+        let note = table_read.as_ref().ok().and_then(Table::note).map(str::to_owned);
+        let others = table_read.err().filter(|_| !is_blank);
         let rows = if is_blank || others.is_some() {
             Ok(None)
         } else {
@@ -169,6 +170,7 @@ impl Playground {
         told["parameter_error"] = json!(parameter_error);
         told["inputs_error"] = json!(inputs_error);
         told["inputs_of_others"] = json!(others);
+        told["inputs_note"] = json!(note);
         if !empty && inputs_error.is_none() {
             self.console = Some(Console::new(loaded.session()?));
         }

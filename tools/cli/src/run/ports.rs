@@ -3,6 +3,7 @@
 
 use crate::terminal::files::{self, Out};
 use crate::terminal::options::suggest;
+use crate::terminal::output;
 use anyhow::{Result, anyhow, bail};
 use std::io::{self, Write};
 use std::path::Path;
@@ -155,6 +156,10 @@ pub(crate) fn runs(
 
 /// Opens a table and reads its header.
 fn open(path: &Path, ports: &[Port], optional: &[Port]) -> Result<Table> {
-    Table::with_optional(files::input_name(path), files::open(path)?, ports, optional)
-        .map_err(|error| anyhow!(error))
+    let table = Table::with_optional(files::input_name(path), files::open(path)?, ports, optional)
+        .map_err(|error| anyhow!(error))?;
+    if let Some(note) = table.note() {
+        output::note(note);
+    }
+    Ok(table)
 }

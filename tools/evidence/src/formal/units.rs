@@ -54,7 +54,12 @@ pub(super) fn prove(arguments: &Arguments, names: &[String], share: bool) -> Res
     let own = std::env::current_exe().context("this program's file is unknown")?;
     command.env("TAKT_ENUMERATOR", &own);
     command.arg(root().join("rtl/formal/prove.py")).arg("--folder").arg(root().join("target/formal/units"));
-    command.args(["--jobs", &arguments.jobs.to_string(), "--mutants", &arguments.mutants.to_string()]);
+    command.args([
+        "--jobs",
+        &arguments.jobs.to_string(),
+        "--mutants",
+        &arguments.mutants.unwrap_or(0).to_string(),
+    ]);
     command.args(share.then_some("--share")).args(arguments.again.then_some("--again"));
     command.args(arguments.verbose.then_some("--verbose"));
     if arguments.certify {

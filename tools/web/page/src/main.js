@@ -501,6 +501,7 @@ function showCycles(program = state.program) {
   if (program.parameter_error) put(` · parameters as in the source: ${program.parameter_error}`, "em");
   if (program.plant_error) put(` · the loop is open: ${program.plant_error}`, "em");
   if (program.inputs_of_others) put(` · the table is not read: ${program.inputs_of_others}`, "em");
+  if (program.inputs_note) put(` · ${program.inputs_note}`, "em");
   const least = Math.max(...periods.map((section) => section.least ?? 0)), more = [];
   if (run?.cycles.length) more.push(`measured in ${plural(run.cycles.length, "period")}`);
   if (least > 0) more.push(`no schedule takes fewer than ${least} cycles`);
@@ -516,7 +517,8 @@ function showProgram(program) {
   const { inputs_error: wrong } = program, whole = program.assembled && !wrong;
   const open = program.plant_error && `The loop is open: ${program.plant_error}`;
   const others = program.inputs_of_others && `The table of inputs is for other ports, and is not read: ${program.inputs_of_others}`;
-  el("text").textContent = [wrong && `error: ${wrong}`, open, others, program.text].filter(Boolean).join("\n\n") || "No errors, no warnings.";
+  const note = program.inputs_note && `note: ${program.inputs_note}`;
+  el("text").textContent = [wrong && `error: ${wrong}`, open, others, note, program.text].filter(Boolean).join("\n\n") || "No errors, no warnings.";
   el("tab-messages").classList.toggle("bad", !whole);
   showMistake(wrong ? "The inputs cannot be read." : whole ? "" : "The text does not assemble.", el("text").textContent);
   el("wait").hidden = true;
