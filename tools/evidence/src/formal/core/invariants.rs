@@ -49,14 +49,14 @@ fn front_end(plan: &Plan, of: &mut Reference) {
             .map(|name| inner(of, "sequencer", name));
     let refill = plan.machine.refill;
     // Until the flush, any stage may be valid.
-    let _ = writeln!(of.text, "    wire f_filled = f_first & ~(f_squash & f_left >= 4'd{});", refill - 1);
+    let _ = writeln!(of.text, "    wire f_filled = f_runs & ~(f_squash & f_left >= 4'd{});", refill - 1);
     of.never(
         "f_left",
-        &format!("f_first & (f_left > 4'd{refill} | (~f_squash & f_left > 4'd{}))", plan.machine.resolve),
+        &format!("f_runs & (f_left > 4'd{refill} | (~f_squash & f_left > 4'd{}))", plan.machine.resolve),
     );
     of.equal(
         "flush",
-        "f_first",
+        "f_runs",
         &net::FLUSH.to_string(),
         &format!("f_squash & (f_left == 4'd{})", refill - 1),
     );
@@ -65,27 +65,27 @@ fn front_end(plan: &Plan, of: &mut Reference) {
         let filled = format!("~f_squash | (f_left <= 4'd{})", refill - at);
         of.equal("valid", "f_filled", stage, &filled);
     }
-    of.equal("x_if_zero", "f_first", &zero, &format!("f_if_zero | (f_squash & f_left == 4'd{refill})"));
+    of.equal("x_if_zero", "f_runs", &zero, &format!("f_if_zero | (f_squash & f_left == 4'd{refill})"));
     of.equal(
         "x_if_nonzero",
-        "f_first",
+        "f_runs",
         &nonzero,
         &format!("f_if_nonzero | (f_squash & f_left == 4'd{refill})"),
     );
     let undecided = format!("~f_squash & f_left == 4'd{}", plan.machine.resolve);
-    of.equal("a branch is under way", "f_first", "f_if_zero | f_if_nonzero", &undecided);
-    of.never("one kind of branch is under way", "f_first & f_if_zero & f_if_nonzero");
-    of.equal("advance", "f_first", &net::ADVANCE.to_string(), &format!("~{i} | {}", net::ISSUE));
+    of.equal("a branch is under way", "f_runs", "f_if_zero | f_if_nonzero", &undecided);
+    of.never("one kind of branch is under way", "f_runs & f_if_zero & f_if_nonzero");
+    of.equal("advance", "f_runs", &net::ADVANCE.to_string(), &format!("~{i} | {}", net::ISSUE));
     of.equal("halted", "f_live", &format!("{halt} | {}", net::HALTED), "f_halted");
     of.equal("refused", "f_live", &refused, "f_refused & ~f_refuses");
     let waiting = format!("{} | ({wait} & ~{remembered})", net::WAITING);
-    of.equal("waiting", "f_first", &waiting, "f_waiting");
-    of.equal("remembered", "f_first", &format!("{remembered} & ~{wait}"), "f_remembered");
+    of.equal("waiting", "f_runs", &waiting, "f_waiting");
+    of.equal("remembered", "f_runs", &format!("{remembered} & ~{wait}"), "f_remembered");
     of.never(
         "a wait is under way",
-        &format!("f_first & {wait} & ({} | ~f_squash | f_left != 4'd{refill})", net::WAITING),
+        &format!("f_runs & {wait} & ({} | ~f_squash | f_left != 4'd{refill})", net::WAITING),
     );
-    of.never("a tick is remembered while the machine waits", "f_first & f_waiting & f_remembered");
+    of.never("a tick is remembered while the machine waits", "f_runs & f_waiting & f_remembered");
     of.never("a fault stays", &format!("~{} & f_over & ~{}", net::RST, net::FAULT));
     of.never("nothing issues after a fault", &format!("~{} & f_over & {}", net::RST, net::ISSUE));
 }
@@ -109,8 +109,8 @@ fn decoded(slot: &SlotPlan, of: &mut Reference) {
         let own = Decoded { slot, stage };
         // A word from outside of the program memory is illegal.
         let illegal = format!("~{} | f_{stage}_outside", own.legal());
-        of.equal("illegal", &format!("f_first & {valid}"), &slot.illegal(stage).to_string(), &illegal);
-        let when = format!("f_first & {}", has(of, stage));
+        of.equal("illegal", &format!("f_runs & {valid}"), &slot.illegal(stage).to_string(), &illegal);
+        let when = format!("f_runs & {}", has(of, stage));
         for (number, &latency) in slot.latencies.iter().enumerate() {
             let bit = slot.bit(stage, ControlBit::Result(latency)).to_string();
             of.equal("result", &when, &bit, &format!("{}[{number}]", own.result()));
@@ -153,7 +153,7 @@ fn decoded(slot: &SlotPlan, of: &mut Reference) {
         of.never(
             "bubble",
             &format!(
-                "f_first & f_squash & f_left >= 4'd{from} & f_left <= 4'd{to} & (|{})",
+                "f_runs & f_squash & f_left >= 4'd{from} & f_left <= 4'd{to} & (|{})",
                 slot.control(stage)
             ),
         );
@@ -206,12 +206,12 @@ fn sure(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
 fn flight(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
     let (valid, index) = (slot.in_flight(), slot.in_flight_index());
     for place in 0..slot.depth {
-        of.equal("place", "f_first", &format!("{valid}[{place}]"), &booked(slot, place));
+        of.equal("place", "f_runs", &format!("{valid}[{place}]"), &booked(slot, place));
         if place < places(slot) {
             let own = format!("{index}[{} +: {}]", place * plan.index, plan.index);
             of.equal(
                 "register",
-                &format!("f_first & {}", booked(slot, place)),
+                &format!("f_runs & {}", booked(slot, place)),
                 &own,
                 &register(plan, slot, place),
             );
@@ -222,7 +222,7 @@ fn flight(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
         of.never(
             "register",
             &format!(
-                "f_first & {} & ({} >= {}'d{depth})",
+                "f_runs & {} & ({} >= {}'d{depth})",
                 booked(slot, place),
                 register(plan, slot, place),
                 plan.index
@@ -234,7 +234,7 @@ fn flight(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
             of.never(
                 "one result for a register",
                 &format!(
-                    "f_first & {} & {} & ({} == {})",
+                    "f_runs & {} & {} & ({} == {})",
                     booked(slot, low),
                     booked(slot, high),
                     register(plan, slot, low),
@@ -260,16 +260,16 @@ fn tracker(plan: &Plan, slot: &SlotPlan, late: &LateUnit, of: &mut Reference) {
     let age = age(slot, late, of);
     let working = of.seen(&format!("{}.working", slot.late_instance(late)), "");
     let (latency, interval) = (late.unit.latency, late.unit.interval);
-    of.never("one operation", &format!("f_first & ({age} & ({age} - 1'b1)) != 0"));
+    of.never("one operation", &format!("f_runs & ({age} & ({age} - 1'b1)) != 0"));
     of.equal(
         "in flight",
-        "f_first",
+        "f_runs",
         &slot.late_in_flight(late).to_string(),
         &format!("|{age}[{}:1]", late.beyond),
     );
-    of.equal("working", "f_first", &working, &format!("|{age}[{}:1]", interval - 1));
+    of.equal("working", "f_runs", &working, &format!("|{age}[{}:1]", interval - 1));
     let left = (1..interval).map(|k| format!("({{6{{{age}[{k}]}}}} & 6'd{})", interval - k));
-    of.equal("busy", "f_first", &any(left), &busy(slot, late));
+    of.equal("busy", "f_runs", &any(left), &busy(slot, late));
     for k in 1..=late.beyond {
         let own = slot.late_index(late).to_string();
         if k >= 3 {
@@ -294,7 +294,7 @@ fn tracker(plan: &Plan, slot: &SlotPlan, late: &LateUnit, of: &mut Reference) {
                 &format!("f_{name}_dest{k}"),
             );
         }
-        of.equal("tracked", &format!("f_first & {age}[{k}]"), &own, &register(plan, slot, latency - k));
+        of.equal("tracked", &format!("f_runs & {age}[{k}]"), &own, &register(plan, slot, latency - k));
     }
 }
 
@@ -307,7 +307,7 @@ fn beyond(slot: &SlotPlan, of: &mut Reference) {
             .filter(|late| late.unit.latency > place)
             .map(|late| format!("{}[{}]", age(slot, late, of), late.unit.latency - place))
             .collect();
-        of.equal("beyond", "f_first", &booked(slot, place), &any(tracked.clone()));
+        of.equal("beyond", "f_runs", &booked(slot, place), &any(tracked.clone()));
         let old = slot.late.iter().filter(|late| late.unit.latency >= place + 3);
         let old = any(old
             .map(|late| format!("{}[{}]", age(slot, late, of), late.unit.latency - place))
@@ -315,7 +315,7 @@ fn beyond(slot: &SlotPlan, of: &mut Reference) {
         of.equal("sure", &format!("~{}", net::RST), &format!("f_{}_sure[{place}]", slot.name()), &old);
         for (number, first) in tracked.iter().enumerate() {
             for second in &tracked[number + 1..] {
-                of.never("one tracker", &format!("f_first & {first} & {second}"));
+                of.never("one tracker", &format!("f_runs & {first} & {second}"));
             }
         }
     }
@@ -429,7 +429,7 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, of: &mut Reference) {
                 of.seen(&format!("{instance}.{stage}_index"), &format!("[{last}:0]")),
             ),
         };
-        let when = format!("f_first & {}", has(of, stage));
+        let when = format!("f_runs & {}", has(of, stage));
         of.equal("bank", &when, &bank, &own.bank(operand));
         of.equal("index", &when, &index, &own.index(operand));
     }
@@ -441,7 +441,7 @@ fn waits(plan: &Plan, of: &mut Reference) {
         for place in 0..places(slot) {
             of.never(
                 "quiet",
-                &format!("f_first & {} & (f_quiet > 6'd{})", booked(slot, place), places(slot) - 1 - place),
+                &format!("f_runs & {} & (f_quiet > 6'd{})", booked(slot, place), places(slot) - 1 - place),
             );
         }
         for late in &slot.late {
@@ -449,13 +449,13 @@ fn waits(plan: &Plan, of: &mut Reference) {
             of.never(
                 "quiet",
                 &format!(
-                    "f_first & ({u} != 6'd0) & ({{1'b0, f_quiet}} + {{1'b0, {u}}} > 7'd{})",
+                    "f_runs & ({u} != 6'd0) & ({{1'b0, f_quiet}} + {{1'b0, {u}}} > 7'd{})",
                     late.unit.interval - 1
                 ),
             );
         }
     }
-    of.never("f_waits", "f_first & f_waits > f_quiet");
-    of.never("f_waits", "f_first & (f_waits != 6'd0) & ~f_i_legal");
-    of.never("f_waits", &format!("f_first & f_waits > 6'd{}", longest(plan)));
+    of.never("f_waits", "f_runs & f_waits > f_quiet");
+    of.never("f_waits", "f_runs & (f_waits != 6'd0) & ~f_i_legal");
+    of.never("f_waits", &format!("f_runs & f_waits > 6'd{}", longest(plan)));
 }

@@ -224,8 +224,8 @@ fn front_end(plan: &Plan, of: &mut Reference) {
     reg [3:0] f_left;
     reg f_squash, f_waiting, f_remembered, f_halted, f_over, f_refused, f_if_zero, f_if_nonzero;
     wire f_issues, f_refuses;
-    wire f_first = ~{rst} & ~f_over;
-    wire f_live  = f_first & ~{fault};
+    wire f_runs = ~{rst} & ~f_over;
+    wire f_live  = f_runs & ~{fault};
     wire f_delivered = (f_left == 4'd0) & ~f_waiting & ~f_halted & ~f_refused;
     wire f_redirected = (f_if_zero & ({tested} == 32'd0)) | (f_if_nonzero & ({tested} != 32'd0));
     wire f_ticked = f_remembered | ({ticks} & ~f_waiting);
@@ -375,8 +375,8 @@ fn decision(plan: &Plan, of: &mut Reference) {
     wire f_rule4 = ~{};
     wire f_rule5 = ~({drains} & {undrained});
     wire f_rule6 = ~{};
-    assign f_issues  = f_first & f_delivered & f_i_legal & f_rule2 & f_rule3 & f_rule4 & f_rule5 & f_rule6;
-    assign f_refuses = f_first & f_delivered & ~f_i_legal;
+    assign f_issues  = f_runs & f_delivered & f_i_legal & f_rule2 & f_rule3 & f_rule4 & f_rule5 & f_rule6;
+    assign f_refuses = f_runs & f_delivered & ~f_i_legal;
 
     // Cycles since the last issue, and those of them in which a legal bundle was there and did not issue.
     reg [5:0] f_quiet, f_waits;
@@ -398,13 +398,13 @@ fn decision(plan: &Plan, of: &mut Reference) {
 fn properties(plan: &Plan, of: &mut Reference) {
     of.promise(
         "a bundle issues in the cycle that the rules give, and in no other",
-        "f_first",
+        "f_runs",
         &net::ISSUE.to_string(),
         "f_issues",
     );
     of.promise(
         "an illegal bundle is refused when it is delivered, and no other",
-        "f_first",
+        "f_runs",
         &net::REFUSED.to_string(),
         "f_refuses",
     );

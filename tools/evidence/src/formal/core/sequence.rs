@@ -14,6 +14,10 @@ use takt_rtl::plan::{Plan, Stage};
 
 /// Stages from issue back to fetch, whose bundles follow one another.
 const STAGES: [&str; 4] = ["i", "r", "m", "d"];
+/// For each of them, a net: the bundle's address is outside of the program memory.
+const OUTSIDE: [&str; 4] = ["f_i_outside", "f_r_outside", "f_m_outside", "d_outside"];
+/// Instance of takt_loops.
+const LOOPS: &str = "sequencer.g_loops.loops";
 
 /// Adds the reference, its properties and invariants.
 pub(super) fn add(plan: &Plan, of: &mut Reference) {
@@ -242,13 +246,13 @@ fn faults(plan: &Plan, loops: u32, of: &mut Reference) {
     );
     of.promise(
         "a fault is reported two cycles after its bundle has issued, and no other",
-        "f_first",
+        "f_runs",
         &net::FAULT.to_string(),
         "f_faults",
     );
     of.promise(
         "the address of a fault is that of its bundle",
-        &format!("f_first & {}", net::FAULT),
+        &format!("f_runs & {}", net::FAULT),
         &net::FAULT_ADDRESS.to_string(),
         "f_fault_address",
     );
@@ -268,11 +272,10 @@ fn stages(plan: &Plan, loops: u32, of: &mut Reference) {
     addresses.push(of.seen("sequencer.fetched", "[15:0]"));
     let valid: Vec<String> =
         ["i", "r", "m", "d", "f"].map(|stage| inner(of, "issuing", &format!("{stage}_valid"))).into();
-    let outside = ["f_i_outside", "f_r_outside", "f_m_outside", "d_outside"];
-    let inside =
+    let is_outside =
         |address: &str| if bits < 16 { format!("(|{address}[15:{bits}])") } else { "1'b0".to_owned() };
-    for (place, own) in outside.iter().enumerate() {
-        of.equal("outside", &format!("f_filled & {}", valid[place]), own, &inside(&addresses[place]));
+    for (place, own) in OUTSIDE.iter().enumerate() {
+        of.equal("outside", &format!("f_filled & {}", valid[place]), own, &is_outside(&addresses[place]));
     }
     // The target of a redirection on its way: before the flush in the sequencer's registers, then in fetch, and from stage to stage.
     let refill = plan.machine.refill;
@@ -301,7 +304,6 @@ fn stages(plan: &Plan, loops: u32, of: &mut Reference) {
         "f_live & (f_if_zero | f_if_nonzero) & (~f_known | f_x_return | f_x_loop | f_x_call)",
     );
     of.equal("f_x_loop", "f_live & f_x_loop & ~f_nested", "f_next", "f_x_address + 16'd1");
-    // A loop whose first bundle is outside of the memory: nothing issues after it.
     let more =
         |stage: usize| if loops > 0 { format!("f_again_{}", STAGES[stage]) } else { "1'b0".to_owned() };
     let start =
@@ -310,8 +312,7 @@ fn stages(plan: &Plan, loops: u32, of: &mut Reference) {
         looked(loops, of);
     }
     for place in 0..4 {
-        let older =
-            any(outside[..=place].iter().zip(&valid).map(|(own, valid)| format!("({own} & {valid})")));
+        let older = beyond(&valid, place + 1);
         let follows = format!("{} ? {} : {} + 16'd1", more(place), start(place), addresses[place]);
         of.equal(
             "the bundle after",
@@ -322,6 +323,11 @@ fn stages(plan: &Plan, loops: u32, of: &mut Reference) {
     }
 }
 
+/// Condition: one of the first stages has a bundle from outside of the program memory. Nothing behind it ever issues.
+fn beyond(valid: &[String], stages: usize) -> String {
+    any(OUTSIDE[..stages].iter().zip(valid).map(|(own, valid)| format!("({own} & {valid})")))
+}
+
 /// Address of the bundle in a stage.
 fn address(of: &mut Reference, stage: &str) -> String {
     match stage {
@@ -330,79 +336,63 @@ fn address(of: &mut Reference, stage: &str) -> String {
     }
 }
 
-/// Loops as of each stage: those under way, less those that end before.
+/// Loops as of each stage: those under way, less those that end before it.
 fn looked(loops: u32, of: &mut Reference) {
-    let loops_of = "sequencer.g_loops.loops";
     let last = loops - 1;
     let mut used = "f_used".to_owned();
-    let mut counts: Vec<String> = vec!["3'd0".to_owned(); loops as usize];
-    for stage in STAGES {
-        let valid = inner(of, "issuing", &format!("{stage}_valid"));
-        let (ends, again) =
-            (inner(of, loops_of, &format!("{stage}_ends")), inner(of, loops_of, &format!("{stage}_again")));
+    let mut counts = vec!["3'd0".to_owned(); loops as usize];
+    for stage in STAGES.into_iter().chain(["f"]) {
+        let top = format!("f_top_{stage}");
+        let left = counts.iter().enumerate().map(|(k, count)| {
+            format!("({{16{{{top}[{k}]}}}} & ({} - {{13'd0, {count}}}))", level("f_lefts", k as u32))
+        });
         let _ = writeln!(
             of.text,
             "    wire [{last}:0] f_used_{stage} = {used};
-    wire [{last}:0] f_top_{stage} = f_used_{stage} & ~(f_used_{stage} >> 1);
-    wire f_again_{stage} = {valid} & {again};
-    wire f_pops_{stage} = {valid} & {ends} & ~{again};
+    wire [{last}:0] {top} = f_used_{stage} & ~(f_used_{stage} >> 1);
     wire [15:0] f_last_{stage} = {};
     wire [15:0] f_left_{stage} = {};
     wire [15:0] f_first_{stage} = {};",
-            chosen("f_lasts", &format!("f_top_{stage}"), loops),
-            any((0..loops).map(|k| format!(
-                "({{16{{f_top_{stage}[{k}]}}}} & ({} - {{13'd0, {}}}))",
-                level("f_lefts", k),
-                counts[k as usize]
-            ))),
-            chosen("f_firsts", &format!("f_top_{stage}"), loops),
+            chosen("f_lasts", &top, loops),
+            any(left),
+            chosen("f_firsts", &top, loops),
         );
-        for k in 0..loops as usize {
+        if stage == "f" {
+            break;
+        }
+        let valid = inner(of, "issuing", &format!("{stage}_valid"));
+        let [ends, again] = ["ends", "again"].map(|name| inner(of, LOOPS, &format!("{stage}_{name}")));
+        let _ = writeln!(
+            of.text,
+            "    wire f_again_{stage} = {valid} & {again};\n    wire f_pops_{stage} = {valid} & {ends} & ~{again};"
+        );
+        for (k, count) in counts.iter_mut().enumerate() {
+            let next = format!("f_count_{stage}_{k}");
             let _ = writeln!(
                 of.text,
-                "    wire [2:0] f_count_{stage}_{k} = {} + {{2'd0, f_again_{stage} & f_top_{stage}[{k}]}};",
-                counts[k]
+                "    wire [2:0] {next} = {count} + {{2'd0, f_again_{stage} & {top}[{k}]}};"
             );
-            counts[k] = format!("f_count_{stage}_{k}");
+            *count = next;
         }
         used = format!("(f_pops_{stage} ? f_used_{stage} >> 1 : f_used_{stage})");
     }
-    let _ = writeln!(
-        of.text,
-        "    wire [{last}:0] f_used_f = {used};
-    wire [{last}:0] f_top_f = f_used_f & ~(f_used_f >> 1);
-    wire [15:0] f_last_f = {};
-    wire [15:0] f_left_f = {};
-    wire [15:0] f_first_f = {};",
-        chosen("f_lasts", "f_top_f", loops),
-        any((0..loops).map(|k| format!(
-            "({{16{{f_top_f[{k}]}}}} & ({} - {{13'd0, {}}}))",
-            level("f_lefts", k),
-            counts[k as usize]
-        ))),
-        chosen("f_firsts", "f_top_f", loops),
-    );
 }
 
 /// The registers of takt_loops.
 fn ahead(plan: &Plan, loops: u32, of: &mut Reference) {
-    let path = "sequencer.g_loops.loops";
     let (bits, last) = (plan.code_bits, loops - 1);
-    let used = of.seen(&format!("{path}.used"), &format!("[{last}:0]"));
+    let used = of.seen(&format!("{LOOPS}.used"), &format!("[{last}:0]"));
     of.equal("used", "f_live", &used, "f_used");
     of.never("levels in use", &format!("f_live & (f_used & ~((f_used << 1) | {loops}'d1)) != {loops}'d0"));
-    let innermost = of.seen(&format!("{path}.innermost_last"), "[15:0]");
+    let innermost = of.seen(&format!("{LOOPS}.innermost_last"), "[15:0]");
     of.equal("innermost_last", "f_live & f_used[0]", &innermost, &chosen("f_lasts", "f_top", loops));
-    let outside = ["f_i_outside", "f_r_outside", "f_m_outside", "d_outside"];
     let valid: Vec<String> =
         STAGES.iter().map(|stage| inner(of, "issuing", &format!("{stage}_valid"))).collect();
-    let inside = |until: usize| {
-        any(outside[..until].iter().zip(&valid).map(|(own, valid)| format!("({own} & {valid})")))
-    };
+    let outside = |stages: usize| beyond(&valid, stages);
     let in_memory =
         |address: &str| if bits < 16 { format!("~|{address}[15:{bits}]") } else { "1'b1".to_owned() };
     for k in 0..loops {
-        let at = format!("{path}.g_level[{k}]");
+        let at = format!("{LOOPS}.g_level[{k}]");
         let (first, ends, left) = (
             of.seen(&format!("{at}.first"), &format!("[{}:0]", bits - 1)),
             of.seen(&format!("{at}.last"), "[15:0]"),
@@ -415,7 +405,7 @@ fn ahead(plan: &Plan, loops: u32, of: &mut Reference) {
         of.equal("left", &when, &left, &level("f_lefts", k));
         of.never("left", &format!("{when} & ({} == 16'd0)", level("f_lefts", k)));
         of.never("few", &format!("{when} & ({few} ? {left} >= 16'd16 : {left} < 16'd15)"));
-        let all = format!("f_live & f_filled & ~{}", inside(4));
+        let all = format!("f_live & f_filled & ~{}", outside(4));
         of.equal("begun", &format!("{all} & f_used[{k}]"), &begun, &format!("f_count_d_{k} + 3'd1"));
         of.never(
             "begun",
@@ -432,19 +422,19 @@ fn ahead(plan: &Plan, loops: u32, of: &mut Reference) {
     }
     for (place, stage) in STAGES.iter().enumerate() {
         let (ends, again) =
-            (inner(of, path, &format!("{stage}_ends")), inner(of, path, &format!("{stage}_again")));
+            (inner(of, LOOPS, &format!("{stage}_ends")), inner(of, LOOPS, &format!("{stage}_again")));
         let address = address(of, stage);
-        let when = format!("f_live & f_filled & {} & ~{}", valid[place], inside(place + 1));
+        let when = format!("f_live & f_filled & {} & ~{}", valid[place], outside(place + 1));
         of.equal("ends", &when, &ends, &format!("f_used_{stage}[0] & ({address} == f_last_{stage})"));
         of.equal("again", &when, &again, &format!("{ends} & (f_left_{stage} != 16'd1)"));
     }
     let fetching = inner(of, "issuing", "f_valid");
-    let when = format!("f_live & f_filled & {fetching} & ~{}", inside(4));
+    let when = format!("f_live & f_filled & {fetching} & ~{}", outside(4));
     let register =
-        |of: &mut Reference, name: &str| of.seen(&format!("{path}.{name}"), &format!("[{}:0]", bits - 1));
-    let all = of.seen(&format!("{path}.ahead"), &format!("[{last}:0]"));
+        |of: &mut Reference, name: &str| of.seen(&format!("{LOOPS}.{name}"), &format!("[{}:0]", bits - 1));
+    let all = of.seen(&format!("{LOOPS}.ahead"), &format!("[{last}:0]"));
     let (first, end) = (register(of, "ahead_first"), register(of, "ahead_last"));
-    let (armed, more) = (inner(of, path, "armed"), inner(of, path, "ahead_more"));
+    let (armed, more) = (inner(of, LOOPS, "armed"), inner(of, LOOPS, "ahead_more"));
     of.equal("ahead", &when, &all, "f_used_f");
     of.equal("armed", &when, &armed, &format!("f_used_f[0] & {}", in_memory("f_last_f")));
     let within = format!("{when} & f_used_f[0]");
