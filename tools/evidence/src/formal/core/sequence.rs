@@ -183,23 +183,22 @@ fn stack(plan: &Plan, of: &mut Reference) {
         of.text,
         "
     // Calls under way, and the bundle after an arbitrary one.
-    wire [{}:0] f_level;
+    wire [{last}:0] f_level;
     reg [{bits}:0] f_depth;
     reg [15:0] f_after;
-    wire f_stack_full  = f_x_call & (f_depth == {}'d{depth});
-    wire f_stack_empty = f_x_return & (f_depth == {0}'d0);
+    wire f_stack_full  = f_x_call & (f_depth == {width}'d{depth});
+    wire f_stack_empty = f_x_return & (f_depth == {width}'d0);
     always @(posedge {clk}) begin
         if (f_x_call) begin
             f_depth <= f_depth + 1'b1;
             if (f_depth == {{1'b0, f_level}}) f_after <= f_x_address + 16'd1;
         end
         if (f_x_return) f_depth <= f_depth - 1'b1;
-        if ({}) f_depth <= {}'d0;
+        if ({rst}) f_depth <= {width}'d0;
     end",
-        bits - 1,
-        bits + 1,
-        net::RST,
-        bits + 1
+        last = bits - 1,
+        width = bits + 1,
+        rst = net::RST
     );
     let entries = of.seen("sequencer.entries", &format!("[{bits}:0]"));
     let top = of.seen("sequencer.top", &format!("[{}:0]", bits - 1));
