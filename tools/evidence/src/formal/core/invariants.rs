@@ -185,6 +185,9 @@ fn sure(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
             of.equal("fresh", &format!("~{rst} & ~{fault} & {issued}"), &own, &format!("f_{name}_dest{age}"));
         }
     }
+    for place in places(slot)..slot.depth {
+        of.never("no result", &format!("~{rst} & {valid}[{place}]"));
+    }
     for place in 0..places(slot) {
         let new = slot.latencies.iter().position(|&latency| latency == place + 1);
         let new = new.map_or("1'b0".to_owned(), |number| format!("f_{name}_new1[{number}]"));
