@@ -38,7 +38,7 @@ pub fn folder(
     files.push(put(synthesis, wishbone::on_few_pins(design)));
     files.push(put(format!("{}.v", wishbone::name(design)), wishbone::wrapper(design, latched)));
     files.push(put(format!("{}.v", axi::name(design)), axi::wrapper(design, latched)));
-    files.push(put(bench_file, bench(machine, top, latched)));
+    files.push(put(bench_file, bench(design)));
     let nothing = || "// no program: `takt rtl --program FILE` writes one\n".to_owned();
     files.push(put("program.hex".to_owned(), program.map_or_else(nothing, image)));
     files.push(put("inputs.hex".to_owned(), stimuli(machine, periods)));
@@ -70,7 +70,9 @@ fn stimuli(machine: &Machine, periods: &[Vec<(Register, u32)>]) -> String {
     text
 }
 
-fn bench(machine: &Machine, top: &str, latched: u16) -> String {
+fn bench(design: &Design) -> String {
+    let Design { machine, top, latched, .. } = design;
+    let latched = *latched;
     let input_bits = machine.inputs.depth.trailing_zeros();
     let port_bits = machine.outputs_per_bank.trailing_zeros();
     let mut outputs = String::new();
@@ -126,6 +128,8 @@ fn bench(machine: &Machine, top: &str, latched: u16) -> String {
             ("INDEX_TOP", &(48 + input_bits - 1)),
             ("STIMULUS_TOP", &(32 + input_bits - 1)),
             ("DELAY", &INPUT_DELAY),
+            ("DIFFERS_NET", &design.differs_net()),
+            ("DIFFERS", &design.differs_port()),
         ],
     )
 }

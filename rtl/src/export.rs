@@ -5,7 +5,7 @@
 //! names, and the modules in `src/parts/` write the text.
 
 use crate::circuit::Library;
-use crate::files::CORE;
+use crate::files::{CORE, PAIR};
 use crate::parts;
 use crate::plan::{Plan, PlanError};
 use crate::verilog::ModuleError;
@@ -43,13 +43,15 @@ pub struct Design {
     pub machine: &'static Machine,
     /// Sizes and names of everything generated.
     pub plan: Plan,
-    /// Module name of the core.
+    /// Module name of the core, or of the pair.
     pub top: String,
     /// Verilog files, each with one module of the same name.
     pub files: Vec<DesignFile>,
     /// Default of the core's parameter `LATCHED`: 0 or, for a program with latched ports, its
     /// [`latched_inputs`](takt_isa::Program::latched_inputs). [`export`] sets 0, [`Design::latching`] changes it.
     pub latched: u16,
+    /// Cycles by which a second core is later; `None` without one. [`Design::paired`] adds it.
+    pub second: Option<u32>,
 }
 
 impl DesignFile {
@@ -92,10 +94,41 @@ impl Design {
     /// # Errors
     /// See [`export`].
     pub fn latching(mut self, latched: u16) -> Result<Design, ExportError> {
-        let name = format!("{}.v", self.top);
-        let text = parts::core(&self.plan, latched)?;
-        self.files.iter_mut().filter(|file| file.name == name).for_each(|file| file.text.clone_from(&text));
+        self.put(&self.plan.top(), parts::core(&self.plan, latched)?);
+        if let Some(delay) = self.second {
+            self.put(&self.plan.pair(), parts::pair(&self.plan, latched, delay)?);
+        }
         Ok(Design { latched, ..self })
+    }
+
+    /// Adds a second core, `delay` cycles later, whose outputs are compared with the first one's: the top becomes the pair.
+    ///
+    /// # Errors
+    /// See [`export`].
+    pub fn paired(mut self, delay: u32) -> Result<Design, ExportError> {
+        self.put(&self.plan.pair(), parts::pair(&self.plan, self.latched, delay)?);
+        let modules = PAIR.iter().map(|&(name, text)| (format!("pair/{name}"), text.to_owned()));
+        self.files.extend(modules.map(|(name, text)| DesignFile { name, text }));
+        Ok(Design { top: self.plan.pair(), second: Some(delay), ..self })
+    }
+
+    /// Declaration of the net `differs` around the top: 0 without a second core.
+    pub(crate) fn differs_net(&self) -> &'static str {
+        if self.second.is_some() { "wire        differs;" } else { "wire        differs = 1'b0;" }
+    }
+
+    /// Connection of the top's port `differs` behind its other ports, if it has one.
+    pub fn differs_port(&self) -> &'static str {
+        if self.second.is_some() { ", .differs(differs)" } else { "" }
+    }
+
+    /// Sets the text of a generated module.
+    fn put(&mut self, module: &str, text: String) {
+        let name = format!("{module}.v");
+        match self.files.iter_mut().find(|file| file.name == name) {
+            Some(file) => file.text = text,
+            None => self.files.insert(0, DesignFile { name, text }),
+        }
     }
 }
 
@@ -126,5 +159,5 @@ pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, Ex
             put(format!("units/{name}"), text);
         }
     }
-    Ok(Design { machine, top: plan.top(), files, latched: 0, plan })
+    Ok(Design { machine, top: plan.top(), files, latched: 0, second: None, plan })
 }

@@ -62,6 +62,14 @@ pub(crate) const SYSTEM: &[File] = files!("system":
     "takt_wire.v"
 );
 
+/// Modules between the two cores of a pair.
+#[rustfmt::skip]
+pub(crate) const PAIR: &[File] = files!("pair":
+    "takt_compare.v"
+    "takt_known.v"
+    "takt_later.v"
+);
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -80,5 +88,6 @@ mod tests {
         assert_eq!(UNITS.len() + crate::tables::texts().len(), count("units") + count("units/common"));
         assert_eq!(CORE.len(), count("core"));
         assert_eq!(SYSTEM.len(), count("system"));
+        assert_eq!(PAIR.len(), count("pair"));
     }
 }

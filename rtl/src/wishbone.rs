@@ -69,6 +69,7 @@ const STATUS: Register = Register {
             3,
             "The sticky flags: invalid, divide by zero, overflow, the last in the lowest bit.",
         ),
+        field("differs", 13, 1, "With a second core: the cores have differed, since reset."),
         field("fault_address", 16, 16, "The bundle of the fault."),
     ],
 };
@@ -208,6 +209,8 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
             ("NONE", &(3 + half + 32)),
             ("REPLAY_AT", &padded(16, half, "replay_address")),
             ("TOP", &design.top),
+            ("DIFFERS_NET", &design.differs_net()),
+            ("DIFFERS", &design.differs_port()),
             ("STREAMS", &streams),
         ],
     )

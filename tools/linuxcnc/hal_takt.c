@@ -72,7 +72,8 @@ static const char *const FAULTS[] = {
     "", "the board does not answer", "the board has run out of knots", "the board has stopped its outputs",
     "a joint does not follow", "the board refuses a request", "a position is out of range",
 };
-static const char *const CAUSES[] = {"fault", "halt", "missed deadline", "host silent", "stop", "NaN output"};
+static const char *const CAUSES[] = {"fault", "halt", "missed deadline", "host silent", "stop", "NaN output",
+                                      "trip", "cores differ"};
 
 typedef struct {
     hal_bit_t *enable, *driving, *fault;
@@ -189,7 +190,7 @@ static int look_at_status(void) {
     uint32_t status = board.words[0];
     *hal->misses = board.words[TAKT_MISSES - TAKT_STATUS];
     *hal->cycles = board.words[TAKT_MOST_CYCLES - TAKT_STATUS];
-    *hal->causes = status >> TAKT_CAUSES & 0x3f;
+    *hal->causes = status >> TAKT_CAUSES & 0xff;
     *hal->driving = (status & TAKT_DRIVE) != 0;
     return 0;
 }

@@ -149,9 +149,10 @@ impl Status {
         }
     }
 
-    /// Causes that stopped the drive; last of them `trip`, which stops the peripherals that the wiring names.
+    /// Causes that stopped the drive, and `trip`, which stops the peripherals that the wiring names.
     pub fn causes(self) -> impl Iterator<Item = &'static str> {
-        let names = ["fault", "halt", "missed deadline", "host silent", "stop", "NaN output", TRIP];
+        let names =
+            ["fault", "halt", "missed deadline", "host silent", "stop", "NaN output", TRIP, "cores differ"];
         names.into_iter().enumerate().filter(move |(i, _)| self.0 >> (12 + i) & 1 != 0).map(|(_, name)| name)
     }
 }

@@ -59,6 +59,9 @@ impl Figures {
             ("host silent", _) => {
                 "host silent: no request for as many periods as the wiring's `host` allows".to_owned()
             }
+            ("cores differ", _) => {
+                "cores differ: the second core did not do what the first one did".to_owned()
+            }
             ("stop", _) => "stop: the pin `stop` was 1, or open".to_owned(),
             ("NaN output", _) if self.nan.is_empty() => "NaN output: no output is NaN any more".to_owned(),
             ("NaN output", _) => format!("NaN output: {}", self.nan.join(", ")),

@@ -30,6 +30,9 @@ const PERIOD: f64 = 100.0;
 const BAUD: u32 = 115_200;
 /// Cycles between a tick of a core in a system and the next base tick: the tick's pulse, and the beginning of the next.
 const ROOM: u64 = 8;
+/// Cycles by which a second core is later, unless the wiring states them, and at most: values that differ must not reach a pin first.
+const DELAY: u32 = 2;
+const MOST_DELAY: u32 = 4;
 /// Most cycles of a period.
 pub const MOST_PERIOD: u32 = 1 << 30;
 
@@ -55,6 +58,8 @@ pub struct Wiring {
     pub host: u32,
     /// The device's own oscillator watches the clock; pins go off when it stops.
     pub clock_watch: bool,
+    /// Cycles by which a second core beside each one is later; `None` without second cores.
+    pub second_core: Option<u32>,
     /// The host can read registers and data memory of the cores, which then have shadow memories.
     pub observe: bool,
     /// Pins of the board for the signals of [`SIGNALS`], in the order of that table.
@@ -208,6 +213,7 @@ impl Wiring {
             deadlines: 1,
             host: 0,
             clock_watch: false,
+            second_core: None,
             observe: true,
             signals: [const { None }; SIGNALS.len()],
             carriers: Vec::new(),
@@ -414,6 +420,13 @@ impl Wiring {
     }
 }
 
+/// The table `[second_core]`: cycles by which second cores are later.
+fn second_core(table: &Table<'_>) -> u32 {
+    let delay = table.integer("delay", 1, MOST_DELAY).map_or(DELAY, |at| at.value);
+    table.reject_unknown_keys(&[]);
+    delay
+}
+
 /// The reader of a wiring.
 struct Reader<'a> {
     document: &'a Document<'a>,
@@ -518,6 +531,7 @@ impl<'a> Reader<'a> {
             }
             table.reject_unknown_keys(&[]);
         }
+        let second_core = top.table("second_core").map(|table| second_core(&table));
         let flash = top.table("flash").and_then(|table| self.flash(&table));
         let scope = top.table("scope").map(|table| self.scope(&table));
         let mut peripherals = Vec::new();
@@ -540,6 +554,7 @@ impl<'a> Reader<'a> {
             deadlines,
             host,
             clock_watch,
+            second_core,
             observe,
             signals,
             tick: self.carriers.tick.map(|(tick, _)| tick),

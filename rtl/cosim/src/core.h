@@ -1,5 +1,5 @@
-// Driver of a core by itself. The generated part before it defines SLOTS, RESET_CYCLES, OUTPUTS, LATCHED and the output ports
-// by slot.
+// Driver of a core by itself. The generated part before it defines SLOTS, RESET_CYCLES, OUTPUTS, LATCHED, REGISTERS and the output ports
+// by slot, and PAIR for a pair.
 //
 //   3 load   count, then that many (space, slot, address, low, high); space 3 is an input port. Resets, then loads
 
@@ -65,6 +65,12 @@ static void observe() {
 
 static void look(bool watch) {
     if (watch) observe();
+#ifdef PAIR
+    if (watch && top->differs) {
+        fprintf(stderr, "the cores of the pair differ in cycle %lld\n", (long long)cycle);
+        exit(1);
+    }
+#endif
     // The memory's write port shows every write, one cycle before the memory holds it.
     if (top->stored) data_memory.set(top->stored_address, top->stored_value);
 }
@@ -92,9 +98,24 @@ static void clear_strobes() {
     top->input_write = 0;
 }
 
-// A core starts only when a program is loaded.
+// A core starts only when a program is loaded. The cores of a pair begin with the same words in their banks, as block RAM does: wild
+// programs read registers that nothing has written.
 static void reset() {
     top->clk = 0;
+#ifdef PAIR
+    top->rst = 1;
+    for (unsigned i = 0; i < RESET_CYCLES; i++) pass(false);
+    top->load = top->input_write = 1;
+    top->load_space = TO_REGISTER;
+    top->load_value = 0;
+    top->input_value = 0;
+    for (unsigned i = 0; i < REGISTERS; i++) {
+        top->load_address = i;
+        top->input_index = i;
+        pass(false);
+    }
+    top->load = top->input_write = 0;
+#endif
 }
 
 static void load() {

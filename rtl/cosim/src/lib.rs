@@ -3,7 +3,7 @@
 //!
 //! [`Model`] compiles an exported design with Verilator. [`Lockstep`] runs a program on the design and on the emulator and compares
 //! everything observable, cycle by cycle: issues, writes to registers, flags and memory, output ports, deadlines, halts, faults.
-//! [`random`] generates programs and inputs, [`corners`] programs for cases that are rare at random. [`system`] does the same for systems
+//! [`random`] generates programs and inputs, [`corners`] programs for cases that are rare at random. [`flips`] flips bits of a pair of cores. [`system`] does the same for systems
 //! of several cores.
 //!
 //! Driver, events and comparison are shared. A core and a system have different circuits, however: a compiled core runs any program with
@@ -13,6 +13,7 @@
 mod compare;
 pub mod corners;
 mod event;
+pub mod flips;
 mod lockstep;
 mod model;
 pub mod random;

@@ -4,6 +4,7 @@
 use crate::simulation::{ModelError, Simulation};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use takt_isa::Register;
 use takt_rtl::Design;
 use takt_rtl::export::RESET_CYCLES;
 use takt_rtl::verilator::Sources;
@@ -25,10 +26,12 @@ fn header(design: &Design) -> String {
     let slots = design.machine.slots;
     let mut text = format!(
         "#define SLOTS {}\n#define RESET_CYCLES {RESET_CYCLES}\n#define OUTPUTS {}\n#define LATCHED {}\n\
-         template <class F> static void outputs(F f) {{\n",
+         #define REGISTERS {}\n{}template <class F> static void outputs(F f) {{\n",
         slots.len(),
         design.machine.outputs_per_bank,
-        design.latched
+        design.latched,
+        Register::COUNT,
+        if design.second.is_some() { "#define PAIR\n" } else { "" }
     );
     for (s, slot) in slots.iter().enumerate() {
         let (b, first) = (slot.bank.name, slot.bank.base + slot.bank.depth - design.machine.outputs_per_bank);

@@ -39,14 +39,18 @@ pub(crate) fn file_error(path: &Path) -> impl FnOnce(std::io::Error) -> ModelErr
 
 /// Process of a simulation, with its pipes.
 #[derive(Debug)]
-struct Process {
+pub(crate) struct Process {
     process: Child,
     stdin: Option<ChildStdin>,
     stdout: Option<ChildStdout>,
 }
 
 impl Process {
-    fn start(program: &Path, arguments: &[&OsStr], folder: Option<&Path>) -> Result<Process, ModelError> {
+    pub(crate) fn start(
+        program: &Path,
+        arguments: &[&OsStr],
+        folder: Option<&Path>,
+    ) -> Result<Process, ModelError> {
         let mut command = Command::new(program);
         if let Some(folder) = folder {
             command.current_dir(folder);
@@ -62,14 +66,14 @@ impl Process {
         Ok(Process { process, stdin, stdout })
     }
 
-    fn send(&mut self, words: &[u32]) -> Result<(), ModelError> {
+    pub(crate) fn send(&mut self, words: &[u32]) -> Result<(), ModelError> {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let sent = self.stdin.as_mut().map(|stdin| stdin.write_all(&bytes).and_then(|()| stdin.flush()));
         if matches!(sent, Some(Ok(()))) { Ok(()) } else { Err(self.ended()) }
     }
 
     /// Receives `count` words from the driver.
-    fn receive(&mut self, count: usize) -> Result<Vec<u32>, ModelError> {
+    pub(crate) fn receive(&mut self, count: usize) -> Result<Vec<u32>, ModelError> {
         let mut bytes = vec![0; 4 * count];
         let read = self.stdout.as_mut().map(|stdout| stdout.read_exact(&mut bytes));
         if !matches!(read, Some(Ok(()))) {

@@ -5,9 +5,11 @@ mod axi;
 mod bus;
 mod common;
 mod faults;
+mod flips;
 mod icarus;
 mod lockstep;
 mod netlist;
+mod pair;
 #[path = "../../../asm/tests/random_source/mod.rs"]
 mod random_source;
 mod system;

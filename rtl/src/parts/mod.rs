@@ -9,6 +9,7 @@ mod hazards;
 mod in_flight;
 mod loader;
 mod operands;
+mod pair;
 mod ports;
 mod status;
 mod write_back;
@@ -16,6 +17,8 @@ mod write_back;
 use crate::plan::names::net;
 use crate::plan::{Plan, SlotPlan};
 use crate::verilog::{Expr, Module, ModuleError, Parameter, concat, number};
+
+pub(crate) use pair::pair;
 
 impl Plan {
     /// Concatenates a net of every slot, slot 0 in the lowest bits.
@@ -27,6 +30,22 @@ impl Plan {
 /// Generates the core. `latched` is the default of its parameter `LATCHED`.
 pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
     let mut m = Module::new(&plan.top(), heading(plan), ports::ports(plan));
+    takes_parameters(&mut m, latched);
+    control::parameters(plan, &mut m);
+    loader::write(plan, &mut m);
+    fetch::write(plan, &mut m);
+    control::write(plan, &mut m);
+    in_flight::write(plan, &mut m);
+    operands::write(plan, &mut m);
+    hazards::write(plan, &mut m);
+    execute::write(plan, &mut m);
+    status::write(plan, &mut m);
+    write_back::write(plan, &mut m);
+    m.finish()
+}
+
+/// Adds the parameters of a core.
+fn takes_parameters(m: &mut Module, latched: u16) {
     m.takes(Parameter {
         net: net::LATCHED.clone(),
         value: number(latched.into()),
@@ -39,17 +58,6 @@ pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
         value: number(0),
         heading: "0 or 1: cycles from read_output to read_value".to_owned(),
     });
-    control::parameters(plan, &mut m);
-    loader::write(plan, &mut m);
-    fetch::write(plan, &mut m);
-    control::write(plan, &mut m);
-    in_flight::write(plan, &mut m);
-    operands::write(plan, &mut m);
-    hazards::write(plan, &mut m);
-    execute::write(plan, &mut m);
-    status::write(plan, &mut m);
-    write_back::write(plan, &mut m);
-    m.finish()
 }
 
 /// Generates the decoder of a slot.

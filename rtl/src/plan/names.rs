@@ -43,6 +43,11 @@ impl Plan {
         format!("takt_{}", self.machine.identifier())
     }
 
+    /// Module name of the core with a second one beside it.
+    pub fn pair(&self) -> String {
+        format!("{}_pair", self.top())
+    }
+
     /// Module name of a slot's decoder.
     pub fn decoder(&self, slot: &SlotPlan) -> String {
         format!("{}_decode_{}", self.top(), slot.name())

@@ -16,12 +16,13 @@ pub(super) const LOAD_INPUT: Net = Net::bit("load_input");
 pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, Vec<Net>) {
     let own = &plan.cores[core];
     let inputs = [net::INPUT_WRITE, own.input_index(), net::INPUT_VALUE];
-    (own.read_output(), inputs.into_iter().chain(board_outputs(own)).collect())
+    (own.read_output(), inputs.into_iter().chain(board_outputs(plan, own)).collect())
 }
 
 /// Outputs of a core that only a board uses.
-fn board_outputs(own: &Plan) -> Vec<Net> {
-    vec![
+fn board_outputs(plan: &SystemPlan, own: &Plan) -> Vec<Net> {
+    let differs = plan.second.map(|_| net::DIFFERS);
+    let outputs = [
         net::READ_VALUE,
         net::TICK_MISSED,
         net::TICK_LOST,
@@ -34,7 +35,8 @@ fn board_outputs(own: &Plan) -> Vec<Net> {
         own.retire(),
         own.retire_register(),
         own.retire_value(),
-    ]
+    ];
+    outputs.into_iter().chain(differs).collect()
 }
 
 /// For each mailbox, a value arrives.
@@ -207,8 +209,11 @@ fn write_core(
             }
         }
     }
-    let (seen, unseen) =
-        if is_watched { (board_outputs(own), Vec::new()) } else { (Vec::new(), board_outputs(own)) };
+    let (seen, unseen) = if is_watched {
+        (board_outputs(plan, own), Vec::new())
+    } else {
+        (Vec::new(), board_outputs(plan, own))
+    };
     open.extend(unseen);
     open.extend([own.retire_address(), own.retire_flags()]);
     let mut pins: [(Net, Expr); 4] = [
@@ -225,7 +230,7 @@ fn write_core(
     }
     let [write, index, value, read] = pins.map(|(_, value)| value);
     m.instance(
-        Instance::new(own.top(), "core")
+        Instance::new(if plan.second.is_some() { own.pair() } else { own.top() }, "core")
             .parameter("LATCHED", known.program.latched_inputs().into())
             .same([
                 net::CLK,

@@ -84,10 +84,11 @@ pub fn export_system(
     name: &str,
     library: &Library,
 ) -> Result<SystemDesign, SystemError> {
-    export_driven(description, name, library, Driver::Itself)
+    export_driven(description, name, library, Driver::Itself, None)
 }
 
-/// Generates the circuit of a system whose loader and ticks are in the top, as in [`export_system`], or outside.
+/// Generates the circuit of a system whose loader and ticks are in the top, as in [`export_system`], or outside; `second`: cycles by which
+/// a second core beside each one is later.
 ///
 /// # Errors
 /// See [`export_system`].
@@ -96,6 +97,7 @@ pub fn export_driven(
     name: &str,
     library: &Library,
     driver: Driver,
+    second: Option<u32>,
 ) -> Result<SystemDesign, SystemError> {
     let mut designs: Vec<Design> = Vec::new();
     let mut cores = Vec::new();
@@ -104,7 +106,12 @@ pub fn export_driven(
         let design = match designs.iter().find(|design| design.machine == machine) {
             Some(design) => design,
             None => {
-                let design = export(machine, library)
+                let design = export(machine, library);
+                let design = match second {
+                    Some(delay) => design.and_then(|design| design.paired(delay)),
+                    None => design,
+                };
+                let design = design
                     .map_err(|error| SystemError::Core { core: core.name.clone(), error: Box::new(error) })?;
                 designs.push(design);
                 &designs[designs.len() - 1]
@@ -112,7 +119,7 @@ pub fn export_driven(
         };
         cores.push(design.plan.clone());
     }
-    let plan = SystemPlan::new(description.clone(), cores, name, driver);
+    let plan = SystemPlan { second, ..SystemPlan::new(description.clone(), cores, name, driver) };
     let records = image::records(&plan.description, &plan.mailboxes);
     let image = image::file(&plan, &records, records.len());
     let mut files = vec![DesignFile { name: format!("{}.v", plan.top), text: top::module(&plan, &records)? }];

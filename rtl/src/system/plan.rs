@@ -44,6 +44,8 @@ pub enum Driver {
 pub struct SystemPlan {
     /// Source of loading and ticks.
     pub driver: Driver,
+    /// Cycles by which a second core beside each one is later; `None` without second cores.
+    pub second: Option<u32>,
     /// Cores and links of the system.
     pub description: Description,
     /// Plan of each core, in order.
@@ -92,7 +94,14 @@ impl SystemPlan {
     pub(super) fn new(description: Description, cores: Vec<Plan>, name: &str, driver: Driver) -> SystemPlan {
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         let mailboxes = (0..cores.len()).map(|core| description.mailboxes(core)).collect();
-        SystemPlan { driver, description, cores, top: format!("takt_system_{plain}"), mailboxes }
+        SystemPlan {
+            driver,
+            second: None,
+            description,
+            cores,
+            top: format!("takt_system_{plain}"),
+            mailboxes,
+        }
     }
 
     /// Module name of a core with its gate.

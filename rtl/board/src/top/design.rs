@@ -21,22 +21,37 @@ pub(super) struct Design {
 }
 
 impl Design {
-    pub(super) fn of(application: &Application<'_>, library: &Library) -> Result<Design, TopError> {
+    /// The design of an application; `second`: cycles by which second cores are later.
+    pub(super) fn of(
+        application: &Application<'_>,
+        library: &Library,
+        second: Option<u32>,
+    ) -> Result<Design, TopError> {
         if application.is_program() {
             let program = &application.description().cores[0].program;
-            let takt_rtl::Design { files, top, .. } =
-                export(program.machine, library)?.latching(program.latched_inputs())?;
+            let design = export(program.machine, library)?.latching(program.latched_inputs())?;
+            let takt_rtl::Design { files, top, .. } = match second {
+                Some(delay) => design.paired(delay)?,
+                None => design,
+            };
             return Ok(Design { files, top, number: number_of_program(program), plan: None });
         }
-        let design = system(application.description(), library)?;
-        let number = number_of_system(&design);
+        // A host loads the same images, with second cores and without.
+        let alone = system(application.description(), library, None)?;
+        let number = number_of_system(&alone);
+        let design =
+            if second.is_some() { system(application.description(), library, second)? } else { alone };
         let SystemDesign { files, top, plan, .. } = design;
         Ok(Design { files, top, number, plan: Some(plan) })
     }
 }
 
-fn system(description: &Description, library: &Library) -> Result<SystemDesign, TopError> {
-    let mut design = export_driven(description, "board", library, Driver::Board)?;
+fn system(
+    description: &Description,
+    library: &Library,
+    second: Option<u32>,
+) -> Result<SystemDesign, TopError> {
+    let mut design = export_driven(description, "board", library, Driver::Board, second)?;
     // The board has its own modules for loading and ticks.
     let others = ["takt_loader.v", "takt_start.v", "takt_pace.v"];
     design.files.retain(|file| !others.iter().any(|name| file.name.ends_with(name)));
@@ -52,7 +67,7 @@ pub fn circuit_number<'a>(application: impl Into<Application<'a>>) -> Result<u32
     let description = application.description();
     match application.is_program() {
         true => Ok(number_of_program(&description.cores[0].program)),
-        false => Ok(number_of_system(&system(description, &Library::builtin())?)),
+        false => Ok(number_of_system(&system(description, &Library::builtin(), None)?)),
     }
 }
 

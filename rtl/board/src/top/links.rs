@@ -161,7 +161,8 @@ impl Section<'_> {
                 ("tick_lost", format!("tick_lost[{k}]")),
                 ("status", format!("flags{k}")),
             ];
-            for (port, net) in own {
+            let differs = self.wiring.second_core.map(|_| ("differs", format!("differs{k}")));
+            for (port, net) in own.into_iter().chain(differs) {
                 let _ = writeln!(text, "        .board{k}_{port}({net}),");
             }
             text += &Shadow::of(self.connected.application, k, self.wiring).pins(&format!("board{k}_"));

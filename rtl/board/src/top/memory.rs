@@ -47,6 +47,9 @@ pub(super) fn check(
         let Ok(plan) = Plan::new(machine, library) else { return Ok(None) };
         cores += memories::block_rams(&plan, library, block);
     }
+    // A second core has memories of its own.
+    let times = 1 + u64::from(wiring.second_core.is_some());
+    cores *= times;
     let count = application.description().cores.len();
     let observers =
         if wiring.observe { machines().map(|machine| copies(machine, count, block)).sum() } else { 0 };
@@ -76,7 +79,8 @@ pub(super) fn check(
     }
     let programs = application.description().cores.iter().map(|core| &core.program);
     let small = programs.flat_map(|program| program.machine.logic_memories(program.latched_inputs() > 0));
-    let (needed, has) = (small.map(|memory| memories.flip_flops(memory)).sum::<u64>(), room.flip_flops);
+    let (needed, has) =
+        (times * small.map(|memory| memories.flip_flops(memory)).sum::<u64>(), room.flip_flops);
     if needed > has {
         let (kind, family) = (application.kind(), board.family.text);
         return Err(TopError::FlipFlops { kind, needed, family, device, has });

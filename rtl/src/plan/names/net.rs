@@ -17,6 +17,9 @@ pub static LATCHED: Net = Net::bit("LATCHED");
 /// Parameter: cycles of delay from an output port's number to its value.
 pub static READ_DELAY: Net = Net::bit("READ_DELAY");
 
+/// Parameter of a pair: cycles by which the second core is later.
+pub static DELAY: Net = Net::bit("DELAY");
+
 nets! {
     // ---- ports
     /// Clock of the whole core.
@@ -75,6 +78,8 @@ nets! {
     STORED_VALUE "stored_value" 32;
     /// Sticky flags: invalid, divide by zero, overflow.
     STATUS "status" 3;
+    /// Sticky: the cores of a pair have differed since reset.
+    DIFFERS "differs";
 
     // ---- loader and inputs, registered
     /// The loader writes a word; registered.

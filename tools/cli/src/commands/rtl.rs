@@ -47,6 +47,11 @@ pub(crate) struct Rtl {
     /// Run at most this many periods in the test bench [default: one for each row; without --inputs, 3, with zeros].
     #[arg(long, value_name = "N", value_parser = number::count, requires = "program", allow_hyphen_values = true)]
     periods: Option<u64>,
+    /// Put a second core beside the first one, CYCLES later (1 to 16), whose outputs are compared with the first one's: the top is the pair
+    /// (docs/safety.md).
+    #[arg(long, value_name = "CYCLES", num_args = 0..=1, default_missing_value = "2", conflicts_with = "system",
+        value_parser = clap::value_parser!(u32).range(1..=16))]
+    second_core: Option<u32>,
     /// Print top module and written files as JSON.
     #[arg(long)]
     json: bool,
@@ -98,6 +103,10 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
     }
     let latched = program.as_ref().map_or(0, takt_isa::Program::latched_inputs);
     let design = export(machine, &Library::builtin())?.latching(latched)?;
+    let design = match arguments.second_core {
+        Some(delay) => design.paired(delay)?,
+        None => design,
+    };
     let mut written = Vec::new();
     for file in bench::folder(&design, program.as_ref(), &periods) {
         write(&arguments.output, &file.name, &file.text)?;
@@ -107,7 +116,8 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
         return files::json(&json!({ "machine": machine.name, "top": design.top, "files": written }), out);
     }
     let folder = arguments.output.display();
-    writeln!(out, "{} files in {folder}; the core is {}.v", written.len(), design.top)?;
+    let what = if design.second.is_some() { "pair of cores" } else { "core" };
+    writeln!(out, "{} files in {folder}; the {what} is {}.v", written.len(), design.top)?;
     writeln!(out, "memories: {}", memories_text(machine))?;
     Ok(())
 }

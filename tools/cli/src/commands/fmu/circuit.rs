@@ -28,7 +28,7 @@ use takt_isa::{Program, Type};
 const RUN_TIME: Duration = Duration::from_secs(1);
 const RUN_PERIODS: u32 = 100_000;
 /// Number of causes for which outputs become safe.
-const CAUSES: u32 = 7;
+const CAUSES: u32 = 8;
 
 /// Rejects options whose values come from the wiring.
 fn refuse(arguments: &ToFmu) -> Result<()> {

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Flips of every flip-flop and of a sample of memory bits of a pair of t1: the second core tells of every harmful one.
+#![allow(clippy::print_stdout)]
+
+use crate::common::{assemble, folder};
+use crate::pair::{DELAY, pair};
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
+use std::collections::BTreeMap;
+use takt_asm::{MemoryLoader, Options, Search};
+use takt_cosim::flips::{FlipModel, FlipRegister, Outcome, Stimulus};
+use takt_isa::{Program, T1, Type};
+use takt_programs::TRACKING_INPUTS;
+use takt_rtl::Design;
+
+/// Periods after a flip in which it may show.
+const HORIZON: u32 = 3;
+/// One flip in so many is of a memory's bit.
+const MEMORY: u32 = 8;
+/// Flip-flops from one flip to the next, so that few flips are of all structures; a prime.
+const STRIDE: u64 = 7919;
+/// Cycles from a difference at the first core's ports to `differs`.
+const TOLD: u32 = DELAY + 2;
+
+/// A program whose bits are flipped.
+struct Case {
+    name: &'static str,
+    program: Program,
+    stimulus: Stimulus,
+}
+
+fn source(name: &str, files: &[(&str, &str)]) -> Program {
+    let options = Options { machine: &T1, ..Options::default() };
+    let loader = Search::new(MemoryLoader::new(files)).library(takt_programs::LIBRARY);
+    let assembled = takt_asm::assemble(name, &loader, &options);
+    assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program
+}
+
+/// Values for an input that stay near those before them, as a controller's do.
+fn walk(program: &Program, rows: usize, start: impl Fn(&str) -> (f64, f64)) -> Vec<Vec<u32>> {
+    let mut random = Pcg64Mcg::seed_from_u64(57);
+    let mut values: Vec<f64> = program.inputs.iter().map(|port| start(&port.name).0).collect();
+    let mut row = || {
+        let ports = program.inputs.iter().zip(&mut values);
+        ports
+            .map(|(port, value)| {
+                *value += start(&port.name).1 * (f64::from(random.next_u32()) / f64::from(u32::MAX) - 0.5);
+                if port.ty == Type::F { (*value as f32).to_bits() } else { *value as i32 as u32 }
+            })
+            .collect()
+    };
+    (0..rows).map(|_| row()).collect()
+}
+
+/// The programs: the hybrid robot's tracking, a servo axis, a lamp.
+fn cases() -> Vec<Case> {
+    let tracking = assemble(&T1, "hybrid/tracking.s");
+    let mut lines = TRACKING_INPUTS.lines();
+    let names: Vec<&str> = lines.next().expect("names").split(',').collect();
+    let column = |name: &str| names.iter().position(|known| *known == name).expect("a column");
+    let columns: Vec<usize> = tracking.inputs.iter().map(|port| column(&port.name)).collect();
+    let value = |ty: Type, text: &str| match ty {
+        Type::F => text.parse::<f32>().expect("a number").to_bits(),
+        _ => text.parse::<f64>().expect("a number") as i32 as u32,
+    };
+    let rows = lines.take(60).map(|line| {
+        let fields: Vec<&str> = line.split(',').collect();
+        tracking.inputs.iter().zip(&columns).map(|(port, &at)| value(port.ty, fields[at])).collect()
+    });
+    let rows = rows.collect();
+    let servo = source(
+        "servo.s",
+        &[
+            ("servo.s", include_str!("../../../programs/servo/servo.s")),
+            ("axis.s", include_str!("../../../programs/servo/axis.s")),
+        ],
+    );
+    let servo_rows = walk(&servo, 60, |name| match name {
+        "ia" | "ib" => (0.5, 0.4),
+        "count" => (70_000.0, 300.0),
+        "udc" => (48.0, 0.2),
+        "enable" => (1.0, 0.0),
+        "goal" => (0.7, 0.02),
+        _ => (0.0, 0.0),
+    });
+    let blink = source("blink.s", &[("blink.s", include_str!("../../../programs/examples/blink.s"))]);
+    let case = |name, program, period, rows| Case {
+        name,
+        program,
+        stimulus: Stimulus { period, rows, horizon: HORIZON },
+    };
+    vec![
+        case("tracking", tracking, 800, rows),
+        case("servo", servo, 1000, servo_rows),
+        case("blink", blink, 100, vec![Vec::new(); 400]),
+    ]
+}
+
+fn build(design: &Design) -> FlipModel {
+    FlipModel::build(design, &folder()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Structure that a register belongs to: the core or what compares, and of a core its part.
+fn structure(register: &FlipRegister) -> String {
+    let Some((core, rest)) =
+        register.name.split_once('.').filter(|(core, _)| ["first", "second"].contains(core))
+    else {
+        return "comparison".to_owned();
+    };
+    let part = match rest.split_once('.').map(|(part, _)| part) {
+        _ if register.words > 0 => match rest {
+            rest if rest.contains("program") => "memory_program",
+            rest if rest.starts_with("memory.") => "memory_data",
+            rest if rest.starts_with("outputs.") => "memory_outputs",
+            rest if rest.starts_with("sequencer.") => "memory_stacks",
+            rest if ["one_a.", "one_b.", "one_c."].iter().any(|own| rest.starts_with(own)) => {
+                "memory_registers"
+            }
+            _ => "memory_tables",
+        },
+        None => "pipeline",
+        Some("sequencer" | "issuing") => "sequencer",
+        Some("one_program") => "fetch",
+        Some("one_a" | "one_b" | "one_c") => "operands",
+        Some("one_dest" | "one_results" | "one_recurrence_late" | "one_sine_late") => "scoreboard",
+        Some("one_addmul" | "one_recurrence" | "one_sine" | "one_alu_late") => "units",
+        Some("memory") => "data_port",
+        Some("outputs" | "inputs") => "ports",
+        Some(other) => panic!("`{other}` of the core belongs to no structure"),
+    };
+    format!("{core}.{part}")
+}
+
+/// Counts by structure and outcome.
+type Counts = BTreeMap<String, BTreeMap<&'static str, u64>>;
+
+fn count(counts: &mut Counts, structure: String, at: u32, period: u32, outcome: Outcome) {
+    let own = counts.entry(structure).or_default();
+    let mut add = |name| *own.entry(name).or_default() += 1;
+    add("flips");
+    let Outcome { harmful, differs, stops, is_over } = outcome;
+    if differs.is_some() {
+        add("told");
+    }
+    if let Some(cycle) = differs {
+        add(match cycle - at {
+            0..10 => "told_within_10",
+            10..100 => "told_within_100",
+            after if after < period => "told_within_a_period",
+            _ => "told_later",
+        });
+    }
+    match harmful {
+        Some(wrong) => {
+            add("harmful");
+            let in_time = |by: Option<u32>| by.is_some_and(|cycle| cycle <= wrong + period);
+            if in_time(differs) {
+                add("harmful_told");
+            }
+            if differs.is_some_and(|cycle| cycle <= wrong + TOLD) {
+                add("harmful_told_before_a_pin");
+            }
+            if in_time(stops) {
+                add("harmful_stopped");
+            }
+        }
+        None if differs.is_some() => {}
+        None if is_over => add("masked"),
+        None => add("silent"),
+    }
+}
+
+/// Flips `flips` bits of registers whose names begin with `only`: flip-flops by turns, each in a random cycle, and
+/// random bits of memories; `first` is the number of the first flip. Returns the counts, and the harmful flips that were told late or not at all.
+fn run(case: &Case, model: &FlipModel, (first, flips): (u64, u64), only: &str) -> (Counts, Vec<String>) {
+    let (mut counts, mut late) = (Counts::default(), Vec::new());
+    let mut simulation =
+        model.start(&case.program, &case.stimulus).unwrap_or_else(|error| panic!("{}: {error}", case.name));
+    let of = |of_memory: bool| {
+        let all = simulation.registers.iter().enumerate();
+        all.filter(move |(_, own)| (own.words > 0) == of_memory && own.name.starts_with(only))
+    };
+    let flip_flops: Vec<(usize, u32)> =
+        of(false).flat_map(|(i, own)| (0..own.count()).map(move |bit| (i, bit))).collect();
+    // Small memories are met as often as large ones.
+    let memories: Vec<(usize, u32)> = of(true).map(|(i, own)| (i, own.count())).collect();
+    let mut random = Pcg64Mcg::seed_from_u64(first);
+    let (begin, end) = simulation.cycles;
+    for number in first..first + flips {
+        let is_of_memory = random.next_u32() % MEMORY == 0 || flip_flops.is_empty();
+        let (register, bit) = if is_of_memory {
+            let (register, bits) = memories[random.next_u32() as usize % memories.len()];
+            (register, random.next_u32() % bits)
+        } else {
+            flip_flops[(number * STRIDE) as usize % flip_flops.len()]
+        };
+        let cycle = begin + random.next_u32() % (end - begin);
+        let outcome = simulation.flip(register, bit, cycle).unwrap_or_else(|error| panic!("{error}"));
+        let of = structure(&simulation.registers[register]);
+        assert!(!of.starts_with("second") || outcome.harmful.is_none(), "{of}: {outcome:?}");
+        if outcome.harmful.is_some_and(|wrong| outcome.differs.is_none_or(|told| told > wrong + TOLD)) {
+            let name = &simulation.registers[register].name;
+            late.push(format!("{}: bit {bit} of {name}, flipped in cycle {cycle}: {outcome:?}", case.name));
+        }
+        count(&mut counts, of, cycle, case.stimulus.period, outcome);
+    }
+    (counts, late)
+}
+
+fn sum(counts: &Counts, of: &str) -> u64 {
+    counts.values().filter_map(|own| own.get(of)).sum()
+}
+
+/// Flips `TAKT_FLIPS` bits (by default 400) in each program, from number `TAKT_SEED` on.
+#[test]
+fn harmful_flips_are_told() {
+    let number =
+        |name: &str, usual| std::env::var(name).map_or(usual, |text| text.parse::<u64>().expect("a number"));
+    let (first, flips) = (number("TAKT_SEED", 0), number("TAKT_FLIPS", 400));
+    let model = build(&pair(&T1, 0));
+    let mut harmful = 0;
+    for case in cases() {
+        let (counts, late) = run(&case, &model, (first, flips), "");
+        for (structure, own) in &counts {
+            let words = own.iter().map(|(name, count)| format!("{}.{structure}.{name}={count}", case.name));
+            println!("figures: {}", words.collect::<Vec<_>>().join(" "));
+        }
+        assert!(late.is_empty(), "{}", late.join("\n"));
+        harmful += sum(&counts, "harmful");
+    }
+    assert!(harmful > flips / 20, "{harmful} harmful flips");
+}
+
+/// A comparison that leaves out what the exchange reads misses flips in the memory of output ports.
+#[test]
+fn a_comparison_that_leaves_something_out_is_found() {
+    let mut design = pair(&T1, 0);
+    let file = design.files.iter_mut().find(|file| file.base() == format!("{}.v", design.top));
+    let text = &mut file.expect("the pair").text;
+    for (known, net) in [("known", "read_value"), ("later_known", "later_read_value")] {
+        let term = format!("{{32{{{known}}}}} & {net}");
+        assert_eq!(text.matches(&term).count(), 1, "{term}");
+        *text = text.replace(&term, "32'd0");
+    }
+    let case = cases().into_iter().find(|case| case.name == "servo").expect("the servo");
+    let (counts, late) = run(&case, &build(&design), (0, 2000), "first.outputs.g_bank");
+    let (harmful, told) = (sum(&counts, "harmful"), sum(&counts, "harmful_told"));
+    assert!(harmful > 20 && told < harmful / 2 && late.len() as u64 >= harmful - told, "{counts:#?}");
+}
