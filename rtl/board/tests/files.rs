@@ -111,6 +111,25 @@ fn nothing_is_for_a_host_without_a_uart() {
 }
 
 #[test]
+fn a_second_core_is_a_few_cycles_later() {
+    let of = |more: &str| Wiring::read("robot.toml", &format!("{ALONE}\n{more}"), &ulx3s());
+    let delay = |more: &str| of(more).unwrap_or_else(|mistakes| panic!("{mistakes:?}")).second_core;
+    assert_eq!(delay(""), None);
+    assert_eq!(delay("[second_core]\n"), Some(2));
+    assert_eq!(delay("[second_core]\ndelay = 4\n"), Some(4));
+    for (more, place, says) in [
+        ("[second_core]\ndelay = 0\n", "12:9", "`delay`"),
+        ("[second_core]\ndelay = 5\n", "12:9", "`delay`"),
+        ("[second_core]\nlater = 2\n", "12:1", "`later`"),
+    ] {
+        let said = of(more).expect_err(more);
+        let [said] = &said[..] else { panic!("{more}: {said:?}") };
+        let said = said.to_string();
+        assert!(said.contains(says) && said.contains(&format!("robot.toml:{place}")), "{more}: {said}");
+    }
+}
+
+#[test]
 fn every_kind_has_a_module_and_a_model() {
     for kind in KINDS {
         let file = format!("{}.v", kind.module);

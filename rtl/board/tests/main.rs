@@ -17,6 +17,7 @@ mod peripherals;
 mod pins;
 mod project;
 mod scope;
+mod second_core;
 mod selftest;
 mod sensors;
 mod system;

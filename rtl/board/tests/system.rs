@@ -80,7 +80,7 @@ fn periods(board: &mut Simulation, count: u32) {
     board.run(count * PERIOD, &[]).expect("it runs");
 }
 
-fn safe(board: &mut Simulation) -> bool {
+pub(crate) fn safe(board: &mut Simulation) -> bool {
     periods(board, 1);
     let level = |name: &str| board.output(name).expect("a pin");
     ["signal_drive", "motor_high", "motor_low", "lamp_out"].iter().all(|name| level(name) == (false, 0))

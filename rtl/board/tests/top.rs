@@ -18,10 +18,10 @@ use takt_isa::{Program, T1};
 
 /// Wiring and program are files because `cargo xtask test` also makes the routed circuit from them, and runs the routed test if they have
 /// changed.
-const WIRING: &str = include_str!("top/wiring.toml");
+pub(crate) const WIRING: &str = include_str!("top/wiring.toml");
 
 /// Cycles of a period, as in the wiring.
-const PERIOD: u32 = 2000;
+pub(crate) const PERIOD: u32 = 2000;
 
 /// A proportional controller with a set point from the host; `force` is a quarter of the difference, and the lamp is lit at odd counts.
 const PROGRAM: &str = include_str!("top/loop.s");
@@ -51,12 +51,12 @@ fn port(program: &Program, name: &str) -> u16 {
 }
 
 /// Runs whole periods.
-fn periods(board: &mut Simulation, count: u32) {
+pub(crate) fn periods(board: &mut Simulation, count: u32) {
     board.run(count * PERIOD, &[]).expect("it runs");
 }
 
 /// The outputs are safe: nothing drives.
-fn safe(board: &mut Simulation) -> bool {
+pub(crate) fn safe(board: &mut Simulation) -> bool {
     periods(board, 1);
     let level = |name: &str| board.output(name).expect("a pin");
     ["signal_drive", "motor_high", "motor_low", "lamp_out"].iter().all(|name| level(name) == (false, 0))
@@ -121,7 +121,7 @@ fn duty_latency_equals_the_bound() {
 }
 
 /// Board, wiring and program, and a folder for it.
-fn target(folder: &str) -> (Board, Wiring, Program, PathBuf) {
+pub(crate) fn target(folder: &str) -> (Board, Wiring, Program, PathBuf) {
     let board = Board::from_name("ulx3s-85f").expect("a board").expect("a right one");
     let wiring = Wiring::read("wiring.toml", WIRING, &board).expect("a right wiring");
     let first = program(PROGRAM);
@@ -408,7 +408,7 @@ fn invert_a_table(cells: &mut serde_json::Map<String, serde_json::Value>, models
 }
 
 /// Tests everything that the board has to do, from power-up on.
-fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Program) {
+pub(crate) fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Program) {
     let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
     drives_after_power_up(&mut sim, encoder);
     let bounds = takt_analysis::bound(first).expect("it can be bounded");
