@@ -3,7 +3,10 @@
 //
 // Contract
 //   out: in, DELAY cycles later; 1 or more. No reset: after DELAY cycles nothing earlier is left.
+//   The registers stay its own: a tool that merged the first of them with a register of the first core, which takes the same net, would
+//   give both cores the same wrong value when it flips.
 
+(* keep_hierarchy = "yes" *)
 module takt_later #(
     parameter WIDTH = 1,
     parameter DELAY = 2
@@ -13,6 +16,7 @@ module takt_later #(
     output wire [WIDTH-1:0] out
 );
 
+    (* dont_merge *)
     reg  [DELAY*WIDTH-1:0]     line;
     wire [(DELAY+1)*WIDTH-1:0] all = {line, in};
 

@@ -17,6 +17,8 @@ use takt_rtl::Design;
 const HORIZON: u32 = 3;
 /// One flip in so many is of a memory's bit.
 const MEMORY: u32 = 8;
+/// One flip in so many of a flip-flop's is of the second core's or the comparison's, where none is harmful.
+const OTHERS: u32 = 5;
 /// Flip-flops from one flip to the next, so that few flips are of all structures; a prime.
 const STRIDE: u64 = 7919;
 /// Cycles from a difference at the first core's ports to `differs`.
@@ -180,19 +182,28 @@ fn run(case: &Case, model: &FlipModel, (first, flips): (u64, u64), only: &str) -
         let all = simulation.registers.iter().enumerate();
         all.filter(move |(_, own)| (own.words > 0) == of_memory && own.name.starts_with(only))
     };
-    let flip_flops: Vec<(usize, u32)> =
-        of(false).flat_map(|(i, own)| (0..own.count()).map(move |bit| (i, bit))).collect();
+    let bits = |chosen: &dyn Fn(&str) -> bool| -> Vec<(usize, u32)> {
+        let own = of(false).filter(|(_, own)| chosen(&own.name));
+        own.flat_map(|(i, own)| (0..own.count()).map(move |bit| (i, bit))).collect()
+    };
+    let is_first = |name: &str| name.starts_with("first.");
+    let (first_core, others) = (bits(&is_first), bits(&|name| !is_first(name)));
     // Small memories are met as often as large ones.
     let memories: Vec<(usize, u32)> = of(true).map(|(i, own)| (i, own.count())).collect();
+    let (first_bits, other_bits, memory_count) = (first_core.len(), others.len(), memories.len());
+    println!("figures: circuit={first_bits}-and-{other_bits}-flip-flops,{memory_count}-memories");
     let mut random = Pcg64Mcg::seed_from_u64(first);
     let (begin, end) = simulation.cycles;
     for number in first..first + flips {
-        let is_of_memory = random.next_u32() % MEMORY == 0 || flip_flops.is_empty();
-        let (register, bit) = if is_of_memory {
+        let by_turns = |all: &[(usize, u32)]| all[(number * STRIDE) as usize % all.len()];
+        let draw = random.next_u32();
+        let (register, bit) = if draw % MEMORY == 0 || first_core.is_empty() {
             let (register, bits) = memories[random.next_u32() as usize % memories.len()];
             (register, random.next_u32() % bits)
+        } else if draw / MEMORY % OTHERS == 0 {
+            by_turns(&others)
         } else {
-            flip_flops[(number * STRIDE) as usize % flip_flops.len()]
+            by_turns(&first_core)
         };
         let cycle = begin + random.next_u32() % (end - begin);
         let outcome = simulation.flip(register, bit, cycle).unwrap_or_else(|error| panic!("{error}"));
@@ -221,6 +232,15 @@ fn harmful_flips_are_told() {
     let mut harmful = 0;
     for case in cases() {
         let (counts, late) = run(&case, &model, (first, flips), "");
+        let name = case.name;
+        let totals = [
+            ("flips", "flips"),
+            ("harmful", "harmful"),
+            ("told", "harmful_told"),
+            ("stopped", "harmful_stopped"),
+        ];
+        let totals = totals.map(|(total, of)| format!("{name}.{total}={}", sum(&counts, of)));
+        println!("figures: {}", totals.join(" "));
         for (structure, own) in &counts {
             let words = own.iter().map(|(name, count)| format!("{}.{structure}.{name}={count}", case.name));
             println!("figures: {}", words.collect::<Vec<_>>().join(" "));

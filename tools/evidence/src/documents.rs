@@ -4,6 +4,7 @@
 use crate::boards;
 use crate::campaign::record as campaign;
 use crate::formal::results;
+use crate::safety;
 use crate::synth;
 use anyhow::{Context, Result};
 use std::path::PathBuf;
@@ -20,6 +21,7 @@ pub(crate) fn run(check: bool) -> Result<()> {
         results::document()?,
         (campaign::DOCUMENT, with_record()?),
         (boards::DOCUMENT, with_boards()?),
+        (safety::DOCUMENT, with_safety()?),
     ];
     let files = files.into_iter().map(|(path, text)| (PathBuf::from(path), text));
     documents::fresh(&documents::update(files, check)?, "cargo evidence docs")
@@ -39,6 +41,15 @@ fn with_boards() -> Result<String> {
     let text =
         std::fs::read_to_string(root().join(document)).with_context(|| format!("cannot read {document}"))?;
     between(document, &text, ("builds", "docs"), &boards::table()?)
+}
+
+/// Document about safety with the tables of a second core: flipped bits, and cost.
+fn with_safety() -> Result<String> {
+    let document = safety::DOCUMENT;
+    let text =
+        std::fs::read_to_string(root().join(document)).with_context(|| format!("cannot read {document}"))?;
+    let text = between(document, &text, ("flips", "docs"), &safety::tables()?)?;
+    between(document, &text, ("cost", "docs"), &safety::cost(&synth::recorded()?)?)
 }
 
 /// Replaces the text between two marker comments of a document, which name the table and the command that writes it.

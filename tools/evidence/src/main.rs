@@ -19,6 +19,7 @@ mod mutants;
 mod netlist;
 mod other_processors;
 mod routed;
+mod safety;
 mod speed;
 mod synth;
 mod threads;

@@ -101,12 +101,21 @@ pub fn packages(family: &'static Family) -> Result<[&'static str; 2], PlaceError
 }
 
 /// Core of a machine with its memories, as `takt rtl` writes it, with the family's own modules and the bus slave on a few pins, but
-/// without the parts that serve verification only.
+/// without the parts that serve verification only; `second`: cycles by which a second core beside it is later.
 ///
 /// # Errors
 /// If it has no circuit.
-pub fn core(machine: &'static Machine, library: &Library, family: &Family) -> Result<Core, PlaceError> {
+pub fn core(
+    machine: &'static Machine,
+    library: &Library,
+    family: &Family,
+    second: Option<u32>,
+) -> Result<Core, PlaceError> {
     let core = export(machine, library)?;
+    let core = match second {
+        Some(delay) => core.paired(delay)?,
+        None => core,
+    };
     let mut files = BTreeMap::new();
     for file in on_family(&core.files, family) {
         files.insert(file.base().to_owned(), file.text);
@@ -121,7 +130,7 @@ pub fn core(machine: &'static Machine, library: &Library, family: &Family) -> Re
 /// # Errors
 /// If the machine has no circuit, or the family no tools.
 pub fn key(machine: &'static Machine, family: &'static Family) -> Result<String, PlaceError> {
-    let Core { files, top } = core(machine, &Library::builtin(), family)?;
+    let Core { files, top } = core(machine, &Library::builtin(), family, None)?;
     let tools = Tools::of(family)?;
     let commands = (tools.synthesis.commands)(&top, NETLIST, Mapping::of(machine));
     let mut hasher = DefaultHasher::new();
@@ -215,7 +224,7 @@ pub fn prepare(
     family: &'static Family,
 ) -> Result<(), PlaceError> {
     let tools = Tools::of(family)?;
-    let Core { mut files, top } = core(machine, &Library::builtin(), family)?;
+    let Core { mut files, top } = core(machine, &Library::builtin(), family, None)?;
     let (pins, text) = tools.place.measured.pins;
     files.insert(pins.to_owned(), text.to_owned());
     let commands = (tools.synthesis.commands)(&top, NETLIST, Mapping::of(machine));

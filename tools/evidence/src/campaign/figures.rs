@@ -151,9 +151,21 @@ impl MergedResults {
         text
     }
 
+    /// Counts of parts, whose names have two points or more: for a record of their own.
+    pub(super) fn parts(&self) -> BTreeMap<&str, u64> {
+        let counts = self.figures.0.iter().filter_map(|(name, figure)| match figure {
+            Figure::Count(count) if is_of_a_part(name) => Some((name.as_str(), *count)),
+            _ => None,
+        });
+        counts.collect()
+    }
+
     /// Counts and extremes on one line, for the track record.
     pub(super) fn summary(&self) -> String {
         let figure = |(name, figure): (&String, &Figure)| {
+            if is_of_a_part(name) {
+                return None;
+            }
             let name = name.replace('_', " ");
             match figure {
                 Figure::Count(count) => Some(format!("{name} {}", grouped(*count))),
@@ -167,6 +179,11 @@ impl MergedResults {
         };
         self.figures.0.iter().filter_map(figure).collect::<Vec<_>>().join("; ")
     }
+}
+
+/// A figure belongs to a part of what a campaign examines: `tracking.first.units.flips`.
+fn is_of_a_part(name: &str) -> bool {
+    name.matches('.').count() > 1
 }
 
 fn sorted(values: &[(u64, f64)]) -> Vec<(u64, f64)> {

@@ -7,6 +7,7 @@ use crate::campaign::plan::Plan;
 use crate::campaign::table::Campaign;
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::OpenOptions;
 use std::io::Write as _;
@@ -56,6 +57,18 @@ struct Row {
 
 fn path() -> PathBuf {
     root().join("tools/evidence/campaigns.json")
+}
+
+/// Record of the counts of a campaign's parts.
+fn path_of_parts(campaign: &str) -> PathBuf {
+    root().join(format!("tools/evidence/{campaign}.json"))
+}
+
+/// Recorded counts of the parts that a campaign examines.
+pub(crate) fn parts(campaign: &str) -> Result<BTreeMap<String, u64>> {
+    let path = path_of_parts(campaign);
+    let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    serde_json::from_str(&text).with_context(|| format!("{} is not a record of counts", path.display()))
 }
 
 fn rows() -> Result<Vec<Row>> {
@@ -114,6 +127,10 @@ pub(super) fn add(
         date: now()?.split('T').next().unwrap_or_default().to_owned(),
         command,
     };
+    let parts = merged.parts();
+    if !parts.is_empty() {
+        std::fs::write(path_of_parts(campaign.name), serde_json::to_string_pretty(&parts)? + "\n")?;
+    }
     let mut rows = rows()?;
     rows.retain(|old| old.command != row.command);
     rows.push(row);

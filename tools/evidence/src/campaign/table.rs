@@ -101,6 +101,18 @@ pub(super) const CAMPAIGNS: &[Campaign] = &[
             Runs::Test("takt-cosim", "lockstep::random_programs_with_latched_ports", "TAKT_PROGRAMS"),
         )
     },
+    Campaign {
+        compiles: true,
+        ..Campaign::of(
+            "flips",
+            "every flip-flop and a sample of memory bits of two t1 side by side flipped: the comparison tells of the harmful ones",
+            "flips in each of three programs",
+            5000,
+            40,
+            3,
+            Runs::Test("takt-cosim", "flips::harmful_flips_are_told", "TAKT_FLIPS"),
+        )
+    },
     Campaign::of(
         "enclosures",
         "the statements of `takt accuracy` against runs that look for a contradiction",

@@ -35,6 +35,10 @@ pub(crate) struct Arguments {
     /// The machine, with its memories; recorded if it is a row of the table or a file of this repository.
     #[arg(long, default_value = "t3", conflicts_with = "unit")]
     machine: String,
+    /// A second core beside the machine's, CYCLES later.
+    #[arg(long, value_name = "CYCLES", num_args = 0..=1, default_missing_value = "2", conflicts_with_all = ["system", "unit"],
+        value_parser = clap::value_parser!(u32).range(1..=16))]
+    second_core: Option<u32>,
     /// A system of several cores instead, with its programs; recorded if it is one of this repository's.
     #[arg(long, value_name = "SYSTEM.toml", conflicts_with_all = ["machine", "unit"])]
     system: Option<PathBuf>,

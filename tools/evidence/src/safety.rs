@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Tables of a second core: what flipped bits did, by program and by structure, as the campaign `flips` has recorded it, and the cost.
+
+use crate::campaign::record;
+use anyhow::{Context, Result};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use takt_family::{MEASURED, Resources};
+use takt_rtl::synthesis::Synthesis;
+
+/// Document with the tables.
+pub(crate) const DOCUMENT: &str = "docs/safety.md";
+
+/// Design of the cost, as `cargo evidence synth --machine t1 --second-core` names it.
+const PAIR: &str = "t1 and a second core, 2 cycles later";
+
+/// Standard score of a confidence interval of 95 %.
+const SCORE: f64 = 1.959_964;
+
+/// Structures in the order of the table: name in the record, and in words.
+const STRUCTURES: [(&str, &str); 15] = [
+    ("sequencer", "sequencer: addresses, calls, loops, issue"),
+    ("fetch", "fetched word"),
+    ("pipeline", "pipeline registers between decode and execute, loader, inputs"),
+    ("scoreboard", "results in flight, hazards"),
+    ("operands", "operands, forwarding"),
+    ("units", "arithmetic units"),
+    ("data_port", "port of the data memory"),
+    ("ports", "output ports, latches"),
+    ("memory_program", "program memory"),
+    ("memory_data", "data memory"),
+    ("memory_registers", "register banks, input ports"),
+    ("memory_outputs", "output ports' memory"),
+    ("memory_stacks", "return stack, loop stack"),
+    ("memory_tables", "tables of units"),
+    ("comparison", "delay lines, comparison"),
+];
+
+/// Counts of one part: by name.
+#[derive(Default)]
+struct Counts(BTreeMap<String, u64>);
+
+impl Counts {
+    fn of(&self, name: &str) -> u64 {
+        self.0.get(name).copied().unwrap_or(0)
+    }
+}
+
+/// Counts of the record whose names `program.structure` are chosen.
+fn summed(record: &BTreeMap<String, u64>, chosen: impl Fn(&str, &str) -> bool) -> Counts {
+    let mut counts = Counts::default();
+    for (name, count) in record {
+        let parts = name.split_once('.').and_then(|(program, rest)| Some((program, rest.rsplit_once('.')?)));
+        if let Some((program, (structure, of))) = parts
+            && chosen(program, structure)
+        {
+            *counts.0.entry(of.to_owned()).or_default() += count;
+        }
+    }
+    counts
+}
+
+/// Wilson's interval of 95 % for a proportion.
+fn interval(hits: u64, of: u64) -> (f64, f64) {
+    let (n, p) = (of as f64, hits as f64 / of as f64);
+    let middle = (p + SCORE * SCORE / (2.0 * n)) / (1.0 + SCORE * SCORE / n);
+    let half = SCORE / (1.0 + SCORE * SCORE / n) * (p * (1.0 - p) / n + SCORE * SCORE / (4.0 * n * n)).sqrt();
+    ((middle - half).max(0.0), (middle + half).min(1.0))
+}
+
+/// Proportion with its interval, in percent; a dash without cases.
+fn share(hits: u64, of: u64, digits: usize) -> String {
+    if of == 0 {
+        return "–".to_owned();
+    }
+    let (low, high) = interval(hits, of);
+    format!(
+        "{:.digits$} ({:.digits$} to {:.digits$})",
+        100.0 * hits as f64 / of as f64,
+        100.0 * low,
+        100.0 * high
+    )
+}
+
+/// Tables in Markdown.
+pub(crate) fn tables() -> Result<String> {
+    let record = record::parts("flips")?;
+    let mut text = String::from(
+        "Shares in percent, with Wilson's interval of 95 %.\n\n\
+         | program | flips | harmful | detected without a second core | with it, within a period | before a pin is wrong |\n\
+         |---|---|---|---|---|---|\n",
+    );
+    for program in ["tracking", "servo", "blink", "all"] {
+        let counts = summed(&record, |of, _| program == "all" || of == program);
+        let harmful = counts.of("harmful");
+        let [stopped, told, early] =
+            ["harmful_stopped", "harmful_told", "harmful_told_before_a_pin"].map(|name| counts.of(name));
+        let _ = writeln!(
+            text,
+            "| {program} | {} | {harmful} | {} | {} | {} |",
+            counts.of("flips"),
+            share(stopped, harmful, 1),
+            share(told, harmful, 3),
+            share(early, harmful, 3)
+        );
+    }
+    text += "\n| structure of the first core | flips | masked | silent | harmful | detected without a second core | with it | cycles from flip to detection: below 10, below 100, a period, later |\n\
+             |---|---|---|---|---|---|---|---|\n";
+    for (name, words) in STRUCTURES {
+        let full = if name == "comparison" { name.to_owned() } else { format!("first.{name}") };
+        let counts = summed(&record, |_, structure| structure == full);
+        let harmful = counts.of("harmful");
+        let told = ["told_within_10", "told_within_100", "told_within_a_period", "told_later"]
+            .map(|name| counts.of(name).to_string());
+        let _ = writeln!(
+            text,
+            "| {words} | {} | {} | {} | {harmful} | {} | {} | {} |",
+            counts.of("flips"),
+            counts.of("masked"),
+            counts.of("silent"),
+            share(counts.of("harmful_stopped"), harmful, 0),
+            share(counts.of("harmful_told"), harmful, 1),
+            told.join(", ")
+        );
+    }
+    let second = summed(&record, |_, structure| structure.starts_with("second."));
+    let _ = writeln!(
+        text,
+        "\nOf {} flips in the second core {} made the outputs safe without need; none was harmful.",
+        second.of("flips"),
+        second.of("told")
+    );
+    Ok(text)
+}
+
+/// Table of the cost in Markdown: a core, and the same with a second one, placed and routed.
+pub(crate) fn cost(rows: &[Synthesis]) -> Result<String> {
+    let row = |design: &str| {
+        let mut placed = rows.iter().filter(|row| row.device == MEASURED.part && row.grade.is_some());
+        placed.find(|row| row.design == design).with_context(|| format!("{design} has not been placed"))
+    };
+    let (alone, pair) = (row("t1")?, row(PAIR)?);
+    let figures = |Resources { luts, carries, flip_flops, multipliers, block_rams }: &Resources| {
+        let carries = carries.unwrap_or(0);
+        [luts - carries, carries, *luts, *flip_flops, *multipliers, *block_rams]
+    };
+    let (one, two) = (figures(&alone.resources), figures(&pair.resources));
+    let names = ["LUT4", "carry halves", "LUT4 and carry halves", "flip-flops", "multipliers", "block RAMs"];
+    let mut text = format!(
+        "| on {}, grade {} | t1 | with a second core | times |\n|---|---|---|---|\n",
+        MEASURED.part, MEASURED.grade
+    );
+    for ((name, one), two) in names.iter().zip(one).zip(two) {
+        let _ = writeln!(text, "| {name} | {one} | {two} | {:.2} |", two as f64 / one as f64);
+    }
+    let clock = |row: &Synthesis| row.mhz.first().copied().unwrap_or(0.0);
+    let (one, two) = (clock(alone), clock(pair));
+    let _ = writeln!(text, "| MHz, seed 1 | {one:.1} | {two:.1} | {:.2} |", two / one);
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_wilsons() {
+        // Newcombe, Statistics in Medicine 17 (1998), table I: 81 of 263, 0 of 20, 1 of 29.
+        for (hits, of, expected) in
+            [(81, 263, (0.2553, 0.3662)), (0, 20, (0.0, 0.1611)), (1, 29, (0.0061, 0.1718))]
+        {
+            let (low, high) = interval(hits, of);
+            assert!((low - expected.0).abs() < 5e-5 && (high - expected.1).abs() < 5e-5, "{low} to {high}");
+        }
+    }
+
+    #[test]
+    fn counts_are_summed_over_programs() {
+        let record = [
+            ("a.first.units.flips", 3),
+            ("b.first.units.flips", 4),
+            ("b.comparison.flips", 5),
+            ("a.flips", 9),
+        ];
+        let record = record.map(|(name, count)| (name.to_owned(), count)).into();
+        assert_eq!(summed(&record, |_, structure| structure == "first.units").of("flips"), 7);
+        assert_eq!(summed(&record, |program, _| program == "b").of("flips"), 9);
+    }
+}
