@@ -200,7 +200,7 @@ fn run(case: &Case, model: &FlipModel, (first, flips): (u64, u64), only: &str) -
         let (register, bit) = if draw % MEMORY == 0 || first_core.is_empty() {
             let (register, bits) = memories[random.next_u32() as usize % memories.len()];
             (register, random.next_u32() % bits)
-        } else if draw / MEMORY % OTHERS == 0 {
+        } else if (draw / MEMORY).is_multiple_of(OTHERS) {
             by_turns(&others)
         } else {
             by_turns(&first_core)

@@ -65,7 +65,7 @@ const PARTS: &[(&str, &[&str])] = &[
     ("Time and accuracy", &["analysis", "accuracy", "timing", "verify"]),
     ("Running programs", &["debugging", "python", "plant", "fmi", "mujoco", "batch", "traces"]),
     ("Programs from models and C", &["model", "models", "readers", "c"]),
-    ("Motors and boards", &["motor", "power-stage", "board", "protocol", "linuxcnc"]),
+    ("Motors and boards", &["motor", "power-stage", "board", "protocol", "safety", "linuxcnc"]),
     ("Several cores, your own design", &["system", "hardware", "headers", "image"]),
     ("Robots", &["robot", "friction", "generation", "arm", "controller", "robot-commands"]),
     ("The processor", &["isa", "machines", "synthesis", "machine-choice", "trig"]),
