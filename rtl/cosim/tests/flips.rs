@@ -15,8 +15,8 @@ use takt_rtl::Design;
 
 /// Periods after a flip in which it may show.
 const HORIZON: u32 = 3;
-/// One flip in so many is of a memory's bit.
-const MEMORY: u32 = 8;
+/// One flip in so many is of a memory's bit: most of these show late or never, and take as long as many others.
+const MEMORY: u32 = 32;
 /// One flip in so many of a flip-flop's is of the second core's or the comparison's, where none is harmful.
 const OTHERS: u32 = 5;
 /// Flip-flops from one flip to the next, so that few flips are of all structures; a prime.

@@ -107,8 +107,8 @@ pub(super) const CAMPAIGNS: &[Campaign] = &[
             "flips",
             "every flip-flop and a sample of memory bits of two t1 side by side flipped: the comparison tells of the harmful ones",
             "flips in each of three programs",
-            5000,
-            40,
+            2000,
+            60,
             3,
             Runs::Test("takt-cosim", "flips::harmful_flips_are_told", "TAKT_FLIPS"),
         )
