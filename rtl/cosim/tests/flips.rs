@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Flips of every flip-flop and of a sample of memory bits of a pair of t1: the second core tells of every harmful one.
+//! Flips of every flip-flop of the first core of a pair of t1, and of a sample of its other bits: the second core tells of every harmful one.
 #![allow(clippy::print_stdout)]
 
 use crate::common::{assemble, folder};

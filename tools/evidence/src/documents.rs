@@ -43,13 +43,12 @@ fn with_boards() -> Result<String> {
     between(document, &text, ("builds", "docs"), &boards::table()?)
 }
 
-/// Document about safety with the tables of a second core: flipped bits, and cost.
+/// Document about safety with the tables of flipped bits.
 fn with_safety() -> Result<String> {
     let document = safety::DOCUMENT;
     let text =
         std::fs::read_to_string(root().join(document)).with_context(|| format!("cannot read {document}"))?;
-    let text = between(document, &text, ("flips", "docs"), &safety::tables()?)?;
-    between(document, &text, ("cost", "docs"), &safety::cost(&synth::recorded()?)?)
+    between(document, &text, ("flips", "docs"), &safety::tables()?)
 }
 
 /// Replaces the text between two marker comments of a document, which name the table and the command that writes it.

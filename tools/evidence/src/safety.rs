@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tables of a second core: what flipped bits did, by program and by structure, as the campaign `flips` has recorded it, and the cost.
+//! Tables of a second core: what flipped bits did, by program and by structure, as the campaign `flips` has recorded it.
 
 use crate::campaign::record;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use takt_family::{MEASURED, Resources};
-use takt_rtl::synthesis::Synthesis;
 
 /// Document with the tables.
 pub(crate) const DOCUMENT: &str = "docs/safety.md";
-
-/// Design of the cost, as `cargo evidence synth --machine t1 --second-core` names it.
-const PAIR: &str = "t1 and a second core, 2 cycles later";
 
 /// Standard score of a confidence interval of 95 %.
 const SCORE: f64 = 1.959_964;
@@ -130,32 +125,6 @@ pub(crate) fn tables() -> Result<String> {
         second.of("flips"),
         second.of("told")
     );
-    Ok(text)
-}
-
-/// Table of the cost in Markdown: a core, and the same with a second one, placed and routed.
-pub(crate) fn cost(rows: &[Synthesis]) -> Result<String> {
-    let row = |design: &str| {
-        let mut placed = rows.iter().filter(|row| row.device == MEASURED.part && row.grade.is_some());
-        placed.find(|row| row.design == design).with_context(|| format!("{design} has not been placed"))
-    };
-    let (alone, pair) = (row("t1")?, row(PAIR)?);
-    let figures = |Resources { luts, carries, flip_flops, multipliers, block_rams }: &Resources| {
-        let carries = carries.unwrap_or(0);
-        [luts - carries, carries, *luts, *flip_flops, *multipliers, *block_rams]
-    };
-    let (one, two) = (figures(&alone.resources), figures(&pair.resources));
-    let names = ["LUT4", "carry halves", "LUT4 and carry halves", "flip-flops", "multipliers", "block RAMs"];
-    let mut text = format!(
-        "| on {}, grade {} | t1 | with a second core | times |\n|---|---|---|---|\n",
-        MEASURED.part, MEASURED.grade
-    );
-    for ((name, one), two) in names.iter().zip(one).zip(two) {
-        let _ = writeln!(text, "| {name} | {one} | {two} | {:.2} |", two as f64 / one as f64);
-    }
-    let clock = |row: &Synthesis| row.mhz.first().copied().unwrap_or(0.0);
-    let (one, two) = (clock(alone), clock(pair));
-    let _ = writeln!(text, "| MHz, seed 1 | {one:.1} | {two:.1} | {:.2} |", two / one);
     Ok(text)
 }
 
