@@ -294,7 +294,7 @@ fn a_misspelt_column_beside_a_plant_is_told() {
     let (program, plant) =
         (format!("{}/../pi.s", example().display()), format!("{}/dc_motor.toml", example().display()));
     let note = |title: &str| {
-        folder.write("inputs.csv", &format!("{title}\n1\n1\n"));
+        folder.write("inputs.csv", format!("{title}\n1\n1\n"));
         folder.line(&format!("run {program} --plant {plant} --inputs inputs.csv")).stderr
     };
     let passed = "note: inputs.csv: the column";
