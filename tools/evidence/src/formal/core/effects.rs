@@ -15,6 +15,7 @@ use takt_rtl::plan::{Plan, SlotPlan, Stage};
 pub(super) fn add(plan: &Plan, of: &mut Reference) {
     for slot in &plan.slots {
         units(slot, of);
+        bus(plan, slot, of);
         outputs(plan, slot, of);
     }
     memory(plan, of);
@@ -56,6 +57,37 @@ fn units(slot: &SlotPlan, of: &mut Reference) {
             );
         }
     }
+}
+
+/// A slot's bus has the result and the flags of the unit that delivers one, of the data memory or of the loader. Some units are known to
+/// have zeros on their outputs in other cycles.
+fn bus(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
+    let (mut results, mut flags) = (Vec::new(), vec!["3'd0".to_owned()]);
+    for circuit in &slot.circuits {
+        let unit = &circuit.unit;
+        let (valid, result, raised) = (slot.unit_valid(unit), slot.unit_result(unit), slot.unit_flags(unit));
+        results.push(format!("({{32{{{valid}}}}} & {result})"));
+        flags.push(format!("({{3{{{valid}}}}} & {raised})"));
+        if circuit.clears {
+            of.assumed.push(format!("({valid} | ({result} == 32'd0 & {raised} == 3'd0))"));
+        }
+    }
+    results.extend(plan.port_of(slot).map(|port| format!("{}[{} +: 32]", plan.load_result(), 32 * port)));
+    results.push(format!("({{32{{{}}}}} & {})", slot.loaded(), net::LOADED_VALUE));
+    let name = slot.name();
+    let always = "1'b1";
+    of.promise(
+        format!("`{name}`: the bus has the results of its units, no others"),
+        always,
+        &slot.result().to_string(),
+        &any(results),
+    );
+    of.promise(
+        format!("`{name}`: a result has the flags of its unit"),
+        always,
+        &slot.flags().to_string(),
+        &any(flags),
+    );
 }
 
 /// A result for an output port is on the port in the cycle of its writeback.
@@ -217,6 +249,7 @@ fn reports(plan: &Plan, of: &mut Reference) {
         let register = inner(of, "sequencer", name);
         of.equal(name, "f_live", &register, own);
     }
+    after_fault(plan, of);
     // A store in another slot than that at fault may take effect.
     let store = plan.memory().next().is_some_and(|slot| slot.number as usize == plan.control_slot);
     let reports = [net::ISSUED, net::ENDED, net::PUBLISHED].into_iter().chain(store.then_some(net::STORED));
@@ -265,4 +298,34 @@ fn reports(plan: &Plan, of: &mut Reference) {
     }
     of.equal("issued", "f_live", &net::X_ISSUED.to_string(), "f_issued1");
     of.equal("issued", "f_live", &net::WAS_ISSUED.to_string(), "f_issued2");
+}
+
+/// Signals that stay as they are when a fault is reported.
+fn after_fault(plan: &Plan, of: &mut Reference) {
+    let (clk, rst, fault) = (net::CLK, net::RST, net::FAULT);
+    let _ = writeln!(
+        of.text,
+        "
+    // Stops, as they were in the cycle before.
+    reg f_was_waiting, f_was_halted;
+    always @(posedge {clk}) begin f_was_waiting <= {}; f_was_halted <= {}; end",
+        net::WAITING,
+        net::HALTED
+    );
+    let ends = of.seen("sequencer.i_ends", "");
+    let _ = writeln!(
+        of.text,
+        "    reg f_x_halt;\n    always @(posedge {clk}) f_x_halt <= f_issues & {} & ~{ends};",
+        issued(plan.control()).effect(Effect::Halt)
+    );
+    let register = inner(of, "sequencer", "x_halt");
+    of.equal("x_halt", "f_live", &register, "f_x_halt");
+    of.never(
+        "a halt by itself",
+        "f_live & f_x_halt & (f_nested | f_x_call | f_x_return | f_x_loop | f_x_refused)",
+    );
+    let waits = format!("{} & ~f_was_waiting", net::WAITING);
+    of.promise("no bundle after a fault waits", &format!("~{rst} & f_over"), &waits, "1'b0");
+    let halts = format!("{} & ~f_was_halted", net::HALTED);
+    of.promise("no bundle at fault halts, and none after it", &format!("~{rst} & {fault}"), &halts, "1'b0");
 }

@@ -396,6 +396,7 @@ fn decision(plan: &Plan, of: &mut Reference) {
 
 /// Properties that a user relies on.
 fn properties(plan: &Plan, of: &mut Reference) {
+    pins(plan, of);
     of.promise(
         "a bundle issues in the cycle that the rules give, and in no other",
         "f_runs",
@@ -441,5 +442,51 @@ fn properties(plan: &Plan, of: &mut Reference) {
         "f_live",
         &format!("f_waits > 6'd{most}"),
         "1'b0",
+    );
+}
+
+/// Pins that the core takes into a register first: the tick, and input ports.
+fn pins(plan: &Plan, of: &mut Reference) {
+    let (clk, rst, last) = (net::CLK, net::RST, plan.index - 1);
+    let base = (1 << plan.index) - (1_u32 << plan.input_bits);
+    let _ = writeln!(
+        of.text,
+        "
+    // Pins in the cycle before.
+    reg f_pin_tick, f_pin_write;
+    reg [{last}:0] f_pin_index;
+    reg [31:0] f_pin_value;
+    always @(posedge {clk}) begin
+        f_pin_tick  <= {} & ~{rst};
+        f_pin_write <= {};
+        f_pin_index <= {}'d{base} + {};
+        f_pin_value <= {};
+    end",
+        net::TICK,
+        net::INPUT_WRITE,
+        plan.index,
+        plan.input_index(),
+        net::INPUT_VALUE
+    );
+    let always = "1'b1";
+    of.promise(
+        "a tick is seen in the cycle after that on its pin",
+        always,
+        &net::TICKS.to_string(),
+        "f_pin_tick",
+    );
+    of.promise(
+        "an input port is written in the cycle after that on its pins",
+        always,
+        &net::INPUT1.to_string(),
+        "f_pin_write",
+    );
+    let written = net::INPUT1.to_string();
+    of.promise("a value goes to its input port", &written, &plan.input1_index().to_string(), "f_pin_index");
+    of.promise(
+        "an input port has the value on its pins",
+        &written,
+        &net::INPUT1_VALUE.to_string(),
+        "f_pin_value",
     );
 }

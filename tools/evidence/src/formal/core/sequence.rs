@@ -10,7 +10,7 @@ use super::rules::{Reference, any};
 use std::fmt::Write as _;
 use takt_isa::Effect;
 use takt_rtl::plan::names::net;
-use takt_rtl::plan::{Plan, Stage};
+use takt_rtl::plan::{Plan, SlotPlan, Stage};
 
 /// Stages from issue back to fetch, whose bundles follow one another.
 const STAGES: [&str; 4] = ["i", "r", "m", "d"];
@@ -236,12 +236,13 @@ fn faults(plan: &Plan, loops: u32, of: &mut Reference) {
     always @(posedge {clk}) begin
         f_x_refused     <= f_refuses;
         f_faults        <= f_faults | f_at_fault;
-        f_fault_address <= f_x_address;
+        if (~{fault}) f_fault_address <= f_x_address;
         if ({rst}) begin f_x_refused <= 1'b0; f_faults <= 1'b0; end
     end",
         any(addresses),
         clk = net::CLK,
-        rst = net::RST
+        rst = net::RST,
+        fault = net::FAULT
     );
     of.promise(
         "a fault is reported two cycles after its bundle has issued, and no other",
@@ -251,10 +252,11 @@ fn faults(plan: &Plan, loops: u32, of: &mut Reference) {
     );
     of.promise(
         "the address of a fault is that of its bundle",
-        &format!("f_runs & {}", net::FAULT),
+        &format!("~{} & {}", net::RST, net::FAULT),
         &net::FAULT_ADDRESS.to_string(),
         "f_fault_address",
     );
+    kinds(plan, of);
     let refused = inner(of, "sequencer", "x_refused");
     of.equal("x_refused", "f_live", &refused, "f_x_refused");
     for name in ["x_call", "x_return", "x_loop", "nested", "if_zero", "if_nonzero"] {
@@ -262,6 +264,51 @@ fn faults(plan: &Plan, loops: u32, of: &mut Reference) {
         of.never("only what issues redirects", &format!("~{} & {own} & ~f_issued1", net::RST));
     }
     of.never("one redirection", "f_live & ((f_x_call & (f_x_return | f_x_loop)) | (f_x_return & f_x_loop))");
+}
+
+/// Kind and slot of a fault: those of the bundle's first slot at fault.
+fn kinds(plan: &Plan, of: &mut Reference) {
+    let illegal =
+        |slot: &SlotPlan| format!("(~{} | f_i_outside)", Decoded { slot, stage: Stage::Issue }.legal());
+    let first = plan
+        .slots
+        .iter()
+        .rev()
+        .fold("3'd0".to_owned(), |next, slot| format!("{} ? 3'd{} : {next}", illegal(slot), slot.number));
+    let own = "f_nested ? 3'd7 : f_stack_full ? 3'd3 : f_stack_empty ? 3'd4 : f_loop_full ? 3'd5 : f_loop_count ? 3'd6 : 3'd7";
+    let at_control = "(f_nested | f_stack_full | f_stack_empty | f_loop_full | f_loop_count | f_cuts)";
+    let mut found = "6'd0".to_owned();
+    for slot in plan.slots.iter().rev() {
+        let number = slot.number;
+        if let Some(port) = plan.port_of(slot) {
+            found = format!("f_x_port{port}_fault ? {{3'd2, 3'd{number}}} : {found}");
+        }
+        if number as usize == plan.control_slot {
+            found = format!("{at_control} ? {{{own}, 3'd{number}}} : {found}");
+        }
+    }
+    let _ = writeln!(
+        of.text,
+        "
+    // Kind and slot of a fault.
+    reg [2:0] f_illegal_slot, f_kind, f_slot;
+    always @(posedge {clk}) begin
+        f_illegal_slot   <= {first};
+        if (~{fault}) {{f_kind, f_slot}} <= f_x_refused ? {{3'd1, f_illegal_slot}} : {found};
+    end",
+        clk = net::CLK,
+        fault = net::FAULT
+    );
+    let when = format!("~{} & {}", net::RST, net::FAULT);
+    of.promise(
+        "the kind of a fault is that of its bundle's first slot at fault",
+        &when,
+        &net::FAULT_KIND.to_string(),
+        "f_kind",
+    );
+    of.promise("the slot of a fault is the first at fault", &when, &net::FAULT_SLOT.to_string(), "f_slot");
+    let slot = of.seen("sequencer.x_illegal_slot", "[2:0]");
+    of.equal("x_illegal_slot", "f_live & f_x_refused", &slot, "f_illegal_slot");
 }
 
 /// Addresses in the stages: each bundle follows the one before it, and the first is the next one.

@@ -90,19 +90,27 @@ fn flags(plan: &Plan, of: &mut Reference) {
     let _ = writeln!(
         of.text,
         "
-    // The sticky flags.
+    // The sticky flags. A clearing that issued in the last cycle has no effect if a fault is reported now.
     reg [2:0] f_flags;
-    wire [2:0] f_flags_now = f_flags | {raised};
-    always @(posedge {}) f_flags <= {} | (f_issues & {clears}) ? 3'd0 : f_flags_now;",
-        net::CLK,
-        net::RST
+    reg f_clears;
+    wire [2:0] f_flags_now = (f_flags & ~{{3{{f_clears & ~{fault}}}}}) | {raised};
+    always @(posedge {clk}) begin
+        f_flags  <= {rst} ? 3'd0 : f_flags_now;
+        f_clears <= f_issues & {clears};
+    end",
+        clk = net::CLK,
+        rst = net::RST,
+        fault = net::FAULT,
     );
     of.promise(
-        "the flags are those of all operations whose writeback was",
-        "f_live",
+        "the flags are those of all operations whose writeback was, and that no bundle has cleared",
+        &format!("~{}", net::RST),
         &net::STATUS.to_string(),
         "f_flags_now",
     );
+    let clearing = net::X_CLEAR_FLAGS.to_string();
+    of.equal("x_clear_flags", &format!("~{} & ~{}", net::RST, net::FAULT), &clearing, "f_clears");
+    of.equal("sticky", &format!("~{}", net::RST), &net::STICKY.to_string(), "f_flags");
 }
 
 /// Nets of a source.
