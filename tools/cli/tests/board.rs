@@ -46,6 +46,14 @@ fn the_example_fits_its_board_and_a_circuit_is_written() {
          the core takes about 5700 of 83640 LUT4, 21 of 208 block RAMs, 6 of 156 multipliers of the LFE5U-85F (estimated); `takt board \
          build` counts all cells\n"
     );
+    let wiring = std::fs::read_to_string(example("position.toml")).unwrap();
+    folder.write("two.toml", format!("{wiring}\n[second_core]\ndelay = 2\n"));
+    let program = example("position.s");
+    let two = folder
+        .line(&format!("board check --board ulx3s-85f --wiring two.toml --program {program} -m t1"))
+        .ok();
+    assert!(two.contains("the core and its second one take about 11"), "{two}");
+    assert!(two.contains(" 42 of 208 block RAMs, 12 of 156 multipliers"), "{two}");
     folder.line(&format!("board build --board ulx3s-85f {} --sources -o out", position())).ok();
     let pins = folder.read_text("out/pins.lpf");
     assert!(pins.contains("LOCATE COMP \"encoder_a\" SITE \"B11\";"), "{pins}");

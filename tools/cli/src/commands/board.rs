@@ -329,13 +329,13 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
             if let Some(scope) = takt_board::top::scope(&board, &wiring, carried.on_board())? {
                 writeln!(out, "{}", scope_text(scope))?;
             }
-            Ok(writeln!(out, "{}", cells_text(&board, &carried)?)?)
+            Ok(writeln!(out, "{}", cells_text(&board, &wiring, &carried)?)?)
         }
     }
 }
 
 /// Estimated cells of the cores beside those of the device, without the board's own circuit, for families with measurements.
-fn cells_text(board: &Board, carried: &application::Application) -> Result<String> {
+fn cells_text(board: &Board, wiring: &Wiring, carried: &application::Application) -> Result<String> {
     const THEN: &str = "`takt board build` counts all cells";
     let Some(room) = board.device.room.as_ref().filter(|_| Estimator::knows(board.family)) else {
         return Ok(format!("cells: not estimated for the {}; {THEN}", board.family.text));
@@ -343,10 +343,17 @@ fn cells_text(board: &Board, carried: &application::Application) -> Result<Strin
     let estimator = Estimator::of(board.family)?;
     let cores = carried.programs().iter().map(|loaded| estimator.estimate(loaded.program.machine));
     let cores = cores.collect::<Result<Vec<_>, _>>()?;
-    let luts: f64 = cores.iter().map(|core| core.luts).sum();
-    let block_rams: u64 = cores.iter().map(|core| core.block_rams).sum();
-    let multipliers: u64 = cores.iter().map(|core| core.multipliers).sum();
-    let cores = if cores.len() == 1 { "the core takes" } else { "the cores take" };
+    // A second core beside each is another one of the same; what compares the two is small beside them.
+    let times = 1 + u32::from(wiring.second_core.is_some());
+    let luts = f64::from(times) * cores.iter().map(|core| core.luts).sum::<f64>();
+    let block_rams = u64::from(times) * cores.iter().map(|core| core.block_rams).sum::<u64>();
+    let multipliers = u64::from(times) * cores.iter().map(|core| core.multipliers).sum::<u64>();
+    let cores = match (cores.len(), times) {
+        (1, 1) => "the core takes",
+        (1, _) => "the core and its second one take",
+        (_, 1) => "the cores take",
+        _ => "the cores and their second ones take",
+    };
     Ok(format!(
         "{cores} about {:.0} of {} {}, {block_rams} of {} block RAMs, {multipliers} of {} multipliers of the {} (estimated); {THEN}",
         (luts / 100.0).round() * 100.0,
