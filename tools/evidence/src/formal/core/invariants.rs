@@ -6,7 +6,9 @@
 //! all of them in the cycle before.
 
 use super::decoded::{Decoded, EFFECTS};
-use super::rules::{Reference, STAGES, any, booked, busy, longest, pending, places, register, taken};
+use super::rules::{
+    Reference, STAGES, any, booked, busy, longest, pending, places, register, sure_register, taken,
+};
 use std::fmt::Write as _;
 use takt_rtl::plan::names::net;
 use takt_rtl::plan::{ControlBit, LateUnit, Plan, SlotPlan, Stage};
@@ -175,7 +177,7 @@ fn sure(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
             "sure",
             &format!("~{rst} & f_{name}_sure[{place}]"),
             &own,
-            &super::rules::sure_register(plan, slot, place),
+            &sure_register(plan, slot, place),
         );
         for (vector, age) in [(&fresh, 1), (&recent, 2)] {
             let issued = slot.latencies.iter().position(|&latency| latency == place + age);
@@ -280,16 +282,10 @@ fn tracker(plan: &Plan, slot: &SlotPlan, late: &LateUnit, of: &mut Reference) {
                 "sure",
                 &format!("~{} & {age}[{k}]", net::RST),
                 &own,
-                &super::rules::sure_register(plan, slot, latency - k),
+                &sure_register(plan, slot, latency - k),
             );
         } else {
-            let issued = slot
-                .latencies
-                .iter()
-                .position(|&other| other == latency)
-                .expect("the latency is one of the slot's");
             let name = slot.name();
-            let _ = issued;
             of.equal(
                 "tracked",
                 &format!("~{} & ~{} & {age}[{k}]", net::RST, net::FAULT),
