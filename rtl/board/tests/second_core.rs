@@ -2,7 +2,7 @@
 //! Boards with second cores: no pin changes, and outputs are safe before a wrong value reaches a pin.
 
 use crate::system::{safe as system_is_safe, ulx3s, unchanged, wiring_with};
-use crate::top::{PERIOD, WIRING, periods, runs_talks_and_fails_safe, safe, target};
+use crate::top::{PERIOD, WIRING, have_the_same_pins, periods, runs_talks_and_fails_safe, safe, target};
 use std::path::Path;
 use takt_board::simulation::{EncoderMotion, Simulation};
 use takt_board::{Host, Wiring, top};
@@ -49,24 +49,7 @@ fn a_second_core_changes_no_pin() {
         sim.unwrap_or_else(|error| panic!("{error}"))
     };
     let mut both = [start(&alone, "one"), start(&wiring(2), "two")];
-    let mut drove = 0;
-    for run in 0..400 {
-        let levels: Vec<Vec<(bool, u32)>> = both
-            .iter_mut()
-            .map(|board| {
-                let pins = ["encoder_a", "encoder_b"].map(|pin| board.input(pin).expect("a pin"));
-                board.turns = vec![EncoderMotion { pins, from: 3 * run, by: 3 }];
-                board.set("signal_stop", run >= 380);
-                board.run(211, &[]).expect("it runs");
-                board.output_levels().collect()
-            })
-            .collect();
-        if run * 211 > top::RESET as i32 {
-            assert_eq!(levels[0], levels[1], "run {run}");
-        }
-        drove += levels[1].iter().map(|(_, high)| high).sum::<u32>();
-    }
-    assert!(drove > 0 && both.iter_mut().all(safe));
+    have_the_same_pins(&mut both);
 }
 
 /// With the longest delay, too, the outputs are safe before a pin shows what a wrong first core computes; the host reads the cause, and a
@@ -122,7 +105,7 @@ fn a_difference_makes_outputs_safe_before_a_pin_is_wrong() {
     }
 }
 
-/// Of a system, every core has a second one; a difference in one makes all outputs safe, and the host sees which.
+/// Every core of a system has a second one: a difference in one pair makes all outputs safe, and names the core to the host.
 #[test]
 fn each_core_of_a_system_has_a_second_one() {
     let description = unchanged();

@@ -62,6 +62,30 @@ pub(crate) fn safe(board: &mut Simulation) -> bool {
     ["signal_drive", "motor_high", "motor_low", "lamp_out"].iter().all(|name| level(name) == (false, 0))
 }
 
+/// Lets an encoder turn at two boards and stops them; their output pins must be the same after the reset, drive, and end safe.
+pub(crate) fn have_the_same_pins(both: &mut [Simulation; 2]) {
+    let mut drove = 0;
+    for run in 0..400 {
+        let levels: Vec<Vec<(bool, u32)>> = both
+            .iter_mut()
+            .map(|board| {
+                // The encoder turns from the start on; `stop` ends the run.
+                let pins = ["encoder_a", "encoder_b"].map(|pin| board.input(pin).expect("a pin"));
+                board.turns = vec![EncoderMotion { pins, from: 3 * run, by: 3 }];
+                board.set("signal_stop", run >= 380);
+                board.run(211, &[]).expect("it runs");
+                board.output_levels().collect()
+            })
+            .collect();
+        // Before the reset has ended, registers hold anything.
+        if run * 211 > top::RESET as i32 {
+            assert_eq!(levels[0], levels[1], "run {run}");
+        }
+        drove += levels[1].iter().map(|(_, high)| high).sum::<u32>();
+    }
+    assert!(drove > 0 && both.iter_mut().all(safe));
+}
+
 /// Cycles in which the upper switch conducts, in one period of the PWM.
 fn pulse(board: &mut Simulation) -> u32 {
     board.run(500, &[]).expect("it runs");
@@ -201,26 +225,7 @@ fn without_a_uart_the_pins_are_the_same() {
     let alone = heard.replace("baud = 5_000_000\n", "uart = false\n");
     assert_ne!(alone, heard);
     let mut both = [of(&heard, "uart"), of(&alone, "none")];
-    let mut drove = 0;
-    for run in 0..400 {
-        let levels: Vec<Vec<(bool, u32)>> = both
-            .iter_mut()
-            .map(|board| {
-                // The encoder turns from the start on; `stop` ends the run.
-                let pins = ["encoder_a", "encoder_b"].map(|pin| board.input(pin).expect("a pin"));
-                board.turns = vec![EncoderMotion { pins, from: 3 * run, by: 3 }];
-                board.set("signal_stop", run >= 380);
-                board.run(211, &[]).expect("it runs");
-                board.output_levels().collect()
-            })
-            .collect();
-        // Before the reset has ended, registers hold anything.
-        if run * 211 > top::RESET as i32 {
-            assert_eq!(levels[0], levels[1], "run {run}");
-        }
-        drove += levels[1].iter().map(|(_, high)| high).sum::<u32>();
-    }
-    assert!(drove > 0 && both.iter_mut().all(safe));
+    have_the_same_pins(&mut both);
 }
 
 static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());

@@ -105,7 +105,7 @@ pub struct Equality {
     pub memories: fn(&str) -> String,
     /// Cells that are cut out of both netlists: memories and multipliers.
     pub cut: &'static [&'static str],
-    /// Those among them, or pins of them as `CELL.PIN`, that outputs do not follow before the next edge of the clock.
+    /// Cells among them, or their pins as `CELL.PIN`, that outputs do not follow before the next edge of the clock.
     pub clocked: &'static [&'static str],
 }
 

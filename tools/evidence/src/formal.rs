@@ -54,7 +54,7 @@ pub(crate) struct Arguments {
     /// proof are not repeated.
     #[arg(long)]
     certify: bool,
-    /// How each planted fault was refuted.
+    /// Report for each planted fault the condition that refuted it.
     #[arg(long)]
     verbose: bool,
 }

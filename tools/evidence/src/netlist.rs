@@ -35,10 +35,10 @@ pub(crate) struct Arguments {
     /// out, and their inputs compared.
     #[arg(long, conflicts_with = "programs")]
     prove: bool,
-    /// Of the proof: planted faults to refute, N of each kind.
+    /// Planted faults that the proof must refute, N of each kind.
     #[arg(long, default_value_t = 20, value_name = "N", requires = "prove")]
     mutants: usize,
-    /// How each planted fault was refuted.
+    /// Report for each planted fault the place that refuted it.
     #[arg(long, requires = "prove")]
     verbose: bool,
 }

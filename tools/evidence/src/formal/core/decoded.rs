@@ -5,6 +5,7 @@ use super::rules::any;
 use std::fmt::Write as _;
 use takt_isa::shape::{Field, OPCODE};
 use takt_isa::{Bank, Effect, Register, Row, Unit};
+use takt_rtl::plan::names::LETTERS;
 use takt_rtl::plan::{Plan, SlotPlan, Stage};
 
 /// Effects that the reference knows.
@@ -24,7 +25,6 @@ pub(super) const EFFECTS: [Effect; 14] = [
     Effect::Wait,
     Effect::Halt,
 ];
-const LETTERS: [&str; 3] = ["a", "b", "c"];
 
 /// The word of a slot in a stage, and the nets of what the tables say of it.
 #[derive(Clone, Copy)]

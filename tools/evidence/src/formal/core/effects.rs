@@ -2,7 +2,7 @@
 //! Effects of a bundle that issues: its operations enter their units, its loads and stores the data memory, its results the ports, each in
 //! its cycle, and nothing else does.
 
-use super::decoded::Decoded;
+use super::decoded::{Decoded, EFFECTS};
 use super::invariants::inner;
 use super::rules::{Reference, any, booked, register};
 use std::fmt::Write as _;
@@ -140,7 +140,7 @@ fn memory(plan: &Plan, of: &mut Reference) {
         let _ = writeln!(
             of.text,
             "
-    reg {own}_loads, {own}_stores, {own}_loads1, {own}_loads2;
+    reg {own}_loads, {own}_stores;
     reg [15:0] {own}_offset;
     wire [33:0] {own}_address = {{18'd0, {own}_offset}} + {{{{2{{{base}[31]}}}}, {base}}};
     wire {own}_fault = ({own}_loads | {own}_stores) & ({own}_address[33] | {own}_address >= 34'd{depth});
@@ -148,8 +148,6 @@ fn memory(plan: &Plan, of: &mut Reference) {
         {own}_loads  <= f_issues & {loads};
         {own}_stores <= f_issues & {stores};
         {own}_offset <= {offset};
-        {own}_loads1 <= {own}_loads;
-        {own}_loads2 <= {own}_loads1;
     end",
             depth = plan.machine.data_depth
         );
@@ -217,7 +215,7 @@ fn reports(plan: &Plan, of: &mut Reference) {
     let _ = writeln!(
         of.text,
         "
-    // What issued in the last cycle, and in the one before.
+    // Issues of the last cycle, and of the one before.
     reg f_issued1, f_issued2, f_ended1, f_ended2, f_published1, f_published2;
     always @(posedge {clk}) begin
         {{f_issued1, f_ended1, f_published1}} <= {{f_issues, f_issues & {wait} & ~{ends}, f_issues & {publish} & ~{ends}}};
@@ -275,18 +273,8 @@ fn reports(plan: &Plan, of: &mut Reference) {
     of.never("nothing issues with an illegal bundle", &format!("~{} & f_refused & f_issued1", net::RST));
     of.never("only what issues stores", &format!("~{} & f_x_port0_stores & ~f_issued1", net::RST));
     let nested = inner(of, "sequencer", "x_nested");
-    let redirects = any([
-        Effect::Jump,
-        Effect::BranchZero,
-        Effect::BranchNonzero,
-        Effect::Call,
-        Effect::Return,
-        Effect::Loop,
-        Effect::Publish,
-        Effect::Wait,
-        Effect::Halt,
-    ]
-    .map(|effect| control.effect(effect)));
+    let redirecting = EFFECTS.into_iter().filter(|effect| effect.redirects());
+    let redirects = any(redirecting.map(|effect| control.effect(effect)));
     let _ = writeln!(
         of.text,
         "    reg f_nested;\n    always @(posedge {}) f_nested <= f_issues & {ends} & {redirects};",

@@ -19,13 +19,13 @@ use takt_automation::command::root;
 use takt_automation::venv::Venv;
 use takt_rtl::Design;
 
-/// How a core is proved.
+/// Options of a core's proof.
 pub(super) struct Way {
     /// Decide by the program CaDiCaL, and check its proofs.
     pub(super) certify: bool,
     /// Planted faults to refute, the first of each list; 0 for all, none of them if absent.
     pub(super) mutants: Option<usize>,
-    /// Report conditions that take long, and each planted fault.
+    /// Report each planted fault.
     pub(super) verbose: bool,
     /// Record the result in `rtl/formal/results.json`.
     pub(super) record: bool,

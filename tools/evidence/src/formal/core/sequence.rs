@@ -457,7 +457,7 @@ fn ahead(plan: &Plan, loops: u32, of: &mut Reference) {
             "begun",
             &format!("{all} & f_used[{k}] & ({} <= {{13'd0, f_count_d_{k}}})", level("f_lefts", k)),
         );
-        // Of a loop whose first bundle is outside of the memory, that is the next one, and illegal.
+        // A first bundle outside of the memory is the next one, and illegal.
         if bits < 16 {
             let beyond = format!("(|f_firsts[{}:{}])", 16 * k + 15, 16 * k + bits);
             of.never(
