@@ -7,19 +7,28 @@
 //   the block RAM, half a cycle, and of the wires from it need a cycle of their own.
 
 module takt_bank #(
-    parameter INDEX = 8  // bits of an index
+    parameter INDEX = 8,  // bits of an index
+    parameter WIDTH = 32
 ) (
     input  wire             clk,
     input  wire             write,
     input  wire [INDEX-1:0] write_index,
-    input  wire [31:0]      write_value,
+    input  wire [WIDTH-1:0] write_value,
     input  wire [INDEX-1:0] read_index,
-    output reg  [31:0]      value
+    output reg  [WIDTH-1:0] value
 );
 
     (* no_rw_check *)
-    reg [31:0] words [0:(1<<INDEX)-1];
-    reg [31:0] read;
+    reg [WIDTH-1:0] words [0:(1<<INDEX)-1];
+    reg [WIDTH-1:0] read;
+
+    // With parities, words that were never written must have the right ones.
+    generate
+        if (WIDTH > 32) begin : g_zeros
+            integer i;
+            initial for (i = 0; i < 1 << INDEX; i = i + 1) words[i] = 0;
+        end
+    endgenerate
 
     always @(posedge clk) begin
         if (write) words[write_index] <= write_value;

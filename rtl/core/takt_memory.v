@@ -6,7 +6,9 @@
 //   port 0's. A load's result is valid (out_valid[p]) in cycle LATENCY after issue, and 0 in other cycles; beside a store to its word
 //   it is the word's old value. fault[p]: the address is outside of the memory; neither port's access has an effect then.
 //   cancel: the accesses in execute are dropped.
-//   load_write: the loader writes, in reset.
+//   rst: the address is load_address; load_write: the loader writes there.
+//   ECC: words have check bits (rtl/ecc/takt_ecc_code.v); a result is corrected. one_wrong[p], two_wrong[p]: port p's word, valid or not, has one
+//   wrong bit, or two; corrected is port 0's.
 //
 // Pipeline
 //   1  address
@@ -17,7 +19,8 @@ module takt_memory #(
     parameter LATENCY = 4,
     parameter DEPTH   = 1024,
     parameter ADDRESS = 10,   // bits of an address, at most 16; DEPTH is 2 to this power
-    parameter PORTS   = 1
+    parameter PORTS   = 1,
+    parameter ECC     = 0     // 0 or 1
 ) (
     input  wire                  clk,
     input  wire                  rst,
@@ -32,7 +35,10 @@ module takt_memory #(
     input  wire                  cancel,
     output wire [PORTS-1:0]      fault,
     output reg  [PORTS-1:0]      out_valid,
-    output reg  [32*PORTS-1:0]   result,
+    output wire [32*PORTS-1:0]   result,
+    output wire [PORTS-1:0]      one_wrong,
+    output wire [PORTS-1:0]      two_wrong,
+    output wire [31:0]           corrected,
     // The store two cycles after issue, for verification.
     output reg                   write,
     output reg  [ADDRESS-1:0]    address,
@@ -77,32 +83,90 @@ module takt_memory #(
         out_valid <= delivers;
     end
 
+    // A word in memory, and the words that the ports read.
+    localparam WIDTH = ECC == 0 ? 32 : 39;
+    wire [WIDTH-1:0]       stored;
+    wire [WIDTH*PORTS-1:0] loaded;
+
     generate
         if (PORTS == 1) begin : g_one
             (* no_rw_check *)
-            reg [31:0] words [0:DEPTH-1];
-            reg [31:0] read;
-            always @(posedge clk) begin
-                if (write) words[address] <= value;
-                else read <= words[address];
-                result <= read & {32{delivers}};
+            reg [WIDTH-1:0] words [0:DEPTH-1];
+            reg [WIDTH-1:0] read;
+            if (ECC != 0) begin : g_zeros
+                integer i;
+                initial for (i = 0; i < DEPTH; i = i + 1) words[i] = 0;  // valid words
             end
+            always @(posedge clk) begin
+                if (write) words[address] <= stored;
+                else read <= words[address];
+            end
+            assign loaded = read;
         end else begin : g_two
             // Port 0 reads the old word when it writes (block RAM mode READBEFOREWRITE). Port 1 reads an undefined word
             // if port 0 is writing it: for equal addresses, both ports deliver port 0's word.
-            reg [31:0] words [0:DEPTH-1];
-            reg [31:0] read, second;
+            reg [WIDTH-1:0] words [0:DEPTH-1];
+            reg [WIDTH-1:0] read, second;
             reg [ADDRESS-1:0] other;
             reg same;
+            if (ECC != 0) begin : g_zeros
+                integer i;
+                initial for (i = 0; i < DEPTH; i = i + 1) words[i] = 0;
+            end
             always @(posedge clk) begin
                 other <= word[ADDRESS +: ADDRESS];
                 same  <= other == address;
-                if (write) words[address] <= value;
+                if (write) words[address] <= stored;
                 read <= words[address];
-                if (write & (other == address)) second <= 32'hxxxxxxxx;
+                if (write & (other == address)) second <= {WIDTH{1'bx}};
                 else second <= words[other];
-                result <= {(same ? read : second) & {32{delivers[PORTS-1]}}, read & {32{delivers[0]}}};
             end
+            assign loaded = {same ? read : second, read};
+        end
+
+        for (p = 0; p < PORTS; p = p + 1) begin : g_result
+            wire [31:0] read = loaded[WIDTH*p +: 32];
+            if (ECC == 0) begin : g_plain
+                reg [31:0] q;
+                always @(posedge clk) q <= read & {32{delivers[p]}};
+                assign result[32*p +: 32] = q;
+                assign {one_wrong[p], two_wrong[p]} = 2'd0;
+            end else begin : g_ecc
+                // The way from the block RAM takes half a cycle: the syndrome's place is known at its end, the word in the next one.
+                wire [6:0]  check;
+                wire [31:0] fixed;
+                wire [15:0] read_low;
+                wire [7:0]  read_high;
+                wire        read_one_wrong, read_two_wrong;
+                reg  [31:0] q;
+                reg  [15:0] low;
+                reg  [7:0]  high;
+                reg         q_one_wrong, q_two_wrong;
+                takt_ecc_code #(.BITS(32)) checks (
+                    .data(read), .check(check), .low(16'd0), .high(8'd0), .corrected()
+                );
+                takt_ecc_place place (
+                    .syndrome(check ^ loaded[WIDTH*p+32 +: 7]), .low(read_low), .high(read_high), .one_wrong(read_one_wrong), .two_wrong(read_two_wrong)
+                );
+                always @(posedge clk) {q, low, high, q_one_wrong, q_two_wrong} <= {read, read_low, read_high, read_one_wrong, read_two_wrong};
+                takt_ecc_code #(.BITS(32)) corrects (
+                    .data(q), .check(), .low(low), .high(high), .corrected(fixed)
+                );
+                assign result[32*p +: 32] = fixed & {32{out_valid[p]}};
+                assign {one_wrong[p], two_wrong[p]} = {q_one_wrong, q_two_wrong};
+                if (p == 0) assign corrected = fixed;
+            end
+        end
+
+        if (ECC == 0) begin : g_stored
+            assign stored    = value;
+            assign corrected = 32'd0;
+        end else begin : g_stored_with_check
+            wire [6:0] check;
+            takt_ecc_code #(.BITS(32)) encodes (
+                .data(value), .check(check), .low(16'd0), .high(8'd0), .corrected()
+            );
+            assign stored = {check, value};
         end
     endgenerate
 

@@ -13,6 +13,9 @@
 //   delayed by one cycle. Bundles that issue in the cycle after that or later read it. If LATCHED, an input port has two buffers:
 //   input_write_place is the one written, m_place the one that the bundle in match reads; input_now: bundles read the written value
 //   from now on.
+//   ECC: words of the banks have a parity bit for each byte. scrubs: the copies read scrub_index, and nothing that the bundles in read and
+//   issue take changes. copies: what the slots' copies delivered two cycles after; sound: with the parities that it should have.
+//   wrong: in the last cycle, the word for the bundle in issue had not.
 //   r_constant: a value in place of a source; 0 if there is a source. i_status, with i_reads_status: the same, a stage later.
 
 module takt_source #(
@@ -21,7 +24,8 @@ module takt_source #(
     parameter LATE  = 1,
     parameter INDEX = 8,
     parameter LATCHED = 0,
-    parameter INPUTS  = 8   // bits of an input port's number
+    parameter INPUTS  = 8,  // bits of an input port's number
+    parameter ECC     = 0   // 0 or 1
 ) (
     input  wire                         clk,
     input  wire                         advance,
@@ -48,6 +52,11 @@ module takt_source #(
     input  wire [31:0]                  input_write_value,
     input  wire [31:0]                  input_next_value,
     input  wire [31:0]                  r_constant,
+    input  wire                         scrubs,
+    input  wire [INDEX-1:0]             scrub_index,
+    output wire [SLOTS*32-1:0]          copies,
+    output wire [SLOTS-1:0]             sound,
+    output wire                         wrong,
     input  wire                         i_reads_status,
     input  wire [31:0]                  i_status,
     output wire                         r_waits,
@@ -89,35 +98,71 @@ module takt_source #(
     wire next_input = advance ? r_is_next : i_is_next;
     wire next_fresh = advance & ~r_taken & ~r_is_next;  // the bundle that enters issue takes the value that was read as its operand
 
-    wire [INDEX-1:0]  read_index = advance ? m_index : r_index;
+    wire [INDEX-1:0]  next_index = advance ? m_index : r_index;
     wire [SLOTS:0]    next_copy  = {r_bank[SLOTS], r_copy} & {(SLOTS + 1){next_fresh}};
     wire [32*SLOTS+31:0] copy;   // of the bundle that was in read in the last cycle
     reg  [SLOTS:0]       shown;  // selects the copy that is its operand: masks the copies, which are the block RAMs' output registers
     always @(posedge clk) shown <= next_copy;
 
+    // A copy's words: the value, and above it with ECC a parity for each byte.
+    localparam WIDTH = ECC == 0 ? 32 : 36;
+    wire [INDEX-1:0]           read_index;
+    wire [WIDTH*SLOTS-1:0]     to_write;
+    wire [WIDTH-1:0]           input_to_write;
+    wire [WIDTH*SLOTS+WIDTH-1:0] delivered;
+
     genvar s;
     generate
+        if (ECC == 0) begin : g_values
+            assign read_index     = next_index;
+            assign to_write       = result;
+            assign input_to_write = input_write_value;
+            assign copy           = delivered;
+            assign sound          = {SLOTS{1'b1}};
+            assign wrong          = 1'b0;
+            wire unused_scrub = &{1'b0, scrubs, scrub_index};
+        end else begin : g_parities
+            assign read_index     = scrubs ? scrub_index : next_index;
+            assign input_to_write = {^input_write_value[31:24], ^input_write_value[23:16], ^input_write_value[15:8], ^input_write_value[7:0],
+                input_write_value};
+            wire [SLOTS:0] intact;
+            for (s = 0; s <= SLOTS; s = s + 1) begin : g_word
+                wire [31:0] word = delivered[WIDTH*s +: 32];
+                assign copy[32*s +: 32] = word;
+                assign intact[s] = delivered[WIDTH*s+32 +: 4] == {^word[31:24], ^word[23:16], ^word[15:8], ^word[7:0]};
+                if (s < SLOTS) begin : g_result
+                    wire [31:0] value = result[32*s +: 32];
+                    assign to_write[WIDTH*s +: WIDTH] = {^value[31:24], ^value[23:16], ^value[15:8], ^value[7:0], value};
+                end
+            end
+            reg shown_wrong;
+            always @(posedge clk) shown_wrong <= |(shown & ~intact);
+            assign sound = intact[SLOTS-1:0];
+            assign wrong = shown_wrong;
+        end
         if (LATCHED == 0) begin : g_inputs
-            takt_bank #(.INDEX(INDEX)) inputs (
-                .clk(clk), .write(input_write), .write_index(input_write_index), .write_value(input_write_value),
-                .read_index(read_index), .value(copy[32*SLOTS +: 32])
+            takt_bank #(.INDEX(INDEX), .WIDTH(WIDTH)) inputs (
+                .clk(clk), .write(input_write), .write_index(input_write_index), .write_value(input_to_write),
+                .read_index(read_index), .value(delivered[WIDTH*SLOTS +: WIDTH])
             );
             wire unused = &{1'b0, m_place, input_write_place};
         end else begin : g_latched_inputs
             reg r_place;
             always @(posedge clk) if (advance) r_place <= m_place;
-            takt_bank #(.INDEX(INPUTS + 1)) inputs (
-                .clk(clk), .write(input_write), .write_index({input_write_place, input_write_index[INPUTS-1:0]}), .write_value(input_write_value),
-                .read_index({advance ? m_place : r_place, read_index[INPUTS-1:0]}), .value(copy[32*SLOTS +: 32])
+            takt_bank #(.INDEX(INPUTS + 1), .WIDTH(WIDTH)) inputs (
+                .clk(clk), .write(input_write), .write_index({input_write_place, input_write_index[INPUTS-1:0]}), .write_value(input_to_write),
+                .read_index({advance ? m_place : r_place, next_index[INPUTS-1:0]}), .value(delivered[WIDTH*SLOTS +: WIDTH])
             );
         end
         for (s = 0; s < SLOTS; s = s + 1) begin : g_slot
-            takt_bank #(.INDEX(INDEX)) bank (
+            takt_bank #(.INDEX(INDEX), .WIDTH(WIDTH)) bank (
                 .clk(clk), .write(writes[s]), .write_index(in_flight_index[s*DEPTH*INDEX +: INDEX]),
-                .write_value(result[32*s +: 32]), .read_index(read_index), .value(copy[32*s +: 32])
+                .write_value(to_write[WIDTH*s +: WIDTH]), .read_index(read_index), .value(delivered[WIDTH*s +: WIDTH])
             );
         end
     endgenerate
+
+    assign copies = copy[32*SLOTS-1:0];
 
     wire [31:0] r_recent;
     takt_onehot_mux #(.VALUES(SLOTS + 1), .AHEAD(0)) choice_recent (

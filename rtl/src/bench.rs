@@ -128,8 +128,8 @@ fn bench(design: &Design) -> String {
             ("INDEX_TOP", &(48 + input_bits - 1)),
             ("STIMULUS_TOP", &(32 + input_bits - 1)),
             ("DELAY", &INPUT_DELAY),
-            ("DIFFERS_NET", &design.differs_net()),
-            ("DIFFERS", &design.differs_port()),
+            ("SAFETY_NETS", &design.safety.nets("")),
+            ("SAFETY", &design.safety.connections("")),
         ],
     )
 }

@@ -5,10 +5,11 @@
 //! names, and the modules in `src/parts/` write the text.
 
 use crate::circuit::Library;
-use crate::files::{CORE, PAIR};
+use crate::files::{CORE, ECC, File, PAIR};
 use crate::parts;
+use crate::plan::names::net;
 use crate::plan::{Plan, PlanError};
-use crate::verilog::ModuleError;
+use crate::verilog::{ModuleError, Net};
 use takt_family::{FAMILIES, Family};
 use takt_isa::Machine;
 use thiserror::Error;
@@ -36,6 +37,42 @@ pub struct DesignFile {
     pub text: String,
 }
 
+/// Mechanisms against random faults of the circuit (docs/safety.md); by default there are none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Safety {
+    /// Memories have codes that detect and correct errors, and a scrubber.
+    pub ecc: bool,
+    /// Cycles by which a second core is later, whose outputs are compared with the first one's; `None` without one.
+    pub second_core: Option<u32>,
+}
+
+impl Safety {
+    /// Ports that a core has for the mechanisms, behind its other ones.
+    pub fn ports(self) -> Vec<Net> {
+        let differs = self.second_core.map(|_| net::DIFFERS);
+        let ecc = self.ecc.then_some([net::CORRECTIONS, net::UPSET]);
+        differs.into_iter().chain(ecc.into_iter().flatten()).collect()
+    }
+
+    /// Declarations, on lines of a module, of nets around a core for the ports of all mechanisms, `suffix` behind the ports' names: 0
+    /// without the mechanism.
+    pub fn nets(self, suffix: &str) -> String {
+        let (all, has) = (Safety { ecc: true, second_core: Some(1) }.ports(), self.ports());
+        let nets = all.iter().map(|net| {
+            let (name, width) = (net.name(), net.width());
+            let range = if width > 1 { format!("[{}:0]", width - 1) } else { String::new() };
+            let value = if has.contains(net) { String::new() } else { format!(" = {width}'d0") };
+            format!("wire {range:6} {name}{suffix}{value};")
+        });
+        nets.collect::<Vec<_>>().join("\n    ")
+    }
+
+    /// Connections of a core's ports for mechanisms to those nets, behind its other ports.
+    pub fn connections(self, suffix: &str) -> String {
+        self.ports().iter().map(|net| format!(", .{0}({0}{suffix})", net.name())).collect()
+    }
+}
+
 /// Circuit of a machine, as Verilog.
 #[derive(Clone, Debug)]
 pub struct Design {
@@ -50,8 +87,8 @@ pub struct Design {
     /// Default of the core's parameter `LATCHED`: 0 or, for a program with latched ports, its
     /// [`latched_inputs`](takt_isa::Program::latched_inputs). [`export`] sets 0, [`Design::latching`] changes it.
     pub latched: u16,
-    /// Cycles by which a second core is later; `None` without one. [`Design::paired`] adds it.
-    pub second: Option<u32>,
+    /// Mechanisms of the circuit. [`export`] adds none, [`Design::with`] adds them.
+    pub safety: Safety,
 }
 
 impl DesignFile {
@@ -95,31 +132,34 @@ impl Design {
     /// See [`export`].
     pub fn latching(mut self, latched: u16) -> Result<Design, ExportError> {
         self.put(&self.plan.top(), parts::core(&self.plan, latched)?);
-        if let Some(delay) = self.second {
+        if let Some(delay) = self.safety.second_core {
             self.put(&self.plan.pair(), parts::pair(&self.plan, latched, delay)?);
         }
         Ok(Design { latched, ..self })
     }
 
-    /// Adds a second core, `delay` cycles later, whose outputs are compared with the first one's: the top becomes the pair.
+    /// Adds mechanisms: with a second core, the top becomes the pair.
     ///
     /// # Errors
     /// See [`export`].
-    pub fn paired(mut self, delay: u32) -> Result<Design, ExportError> {
-        self.put(&self.plan.pair(), parts::pair(&self.plan, self.latched, delay)?);
-        let modules = PAIR.iter().map(|&(name, text)| (format!("pair/{name}"), text.to_owned()));
-        self.files.extend(modules.map(|(name, text)| DesignFile { name, text }));
-        Ok(Design { top: self.plan.pair(), second: Some(delay), ..self })
-    }
-
-    /// Declaration of the net `differs` around the top: 0 without a second core.
-    pub(crate) fn differs_net(&self) -> &'static str {
-        if self.second.is_some() { "wire        differs;" } else { "wire        differs = 1'b0;" }
-    }
-
-    /// Connection of the top's port `differs` behind its other ports, if it has one.
-    pub fn differs_port(&self) -> &'static str {
-        if self.second.is_some() { ", .differs(differs)" } else { "" }
+    pub fn with(mut self, safety: Safety) -> Result<Design, ExportError> {
+        let files = |folder: &str, modules: &[File]| {
+            let file =
+                |&(name, text): &File| DesignFile { name: format!("{folder}/{name}"), text: text.to_owned() };
+            modules.iter().map(file).collect::<Vec<_>>()
+        };
+        if safety.ecc {
+            self.plan.ecc = true;
+            self.files.retain(|file| file.base() != "takt_program.v");
+            self.files.extend(files("ecc", ECC));
+        }
+        if safety.second_core.is_some() {
+            self.top = self.plan.pair();
+            self.files.extend(files("pair", PAIR));
+        }
+        self.safety = safety;
+        let latched = self.latched;
+        self.latching(latched)
     }
 
     /// Sets the text of a generated module.
@@ -159,5 +199,5 @@ pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, Ex
             put(format!("units/{name}"), text);
         }
     }
-    Ok(Design { machine, top: plan.top(), files, latched: 0, second: None, plan })
+    Ok(Design { machine, top: plan.top(), files, latched: 0, safety: Safety::default(), plan })
 }

@@ -70,6 +70,16 @@ pub(crate) const PAIR: &[File] = files!("pair":
     "takt_later.v"
 );
 
+/// Modules of memories with error correction.
+#[rustfmt::skip]
+pub(crate) const ECC: &[File] = files!("ecc":
+    "takt_ecc_code.v"
+    "takt_ecc_place.v"
+    "takt_ecc_program.v"
+    "takt_ecc_report.v"
+    "takt_ecc_scrub.v"
+);
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,5 +99,6 @@ mod tests {
         assert_eq!(CORE.len(), count("core"));
         assert_eq!(SYSTEM.len(), count("system"));
         assert_eq!(PAIR.len(), count("pair"));
+        assert_eq!(ECC.len(), count("ecc"));
     }
 }

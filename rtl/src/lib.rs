@@ -25,7 +25,7 @@ pub mod verilog;
 pub mod wishbone;
 
 pub use circuit::{Circuit, CircuitError, Library, Operation};
-pub use export::{Design, ExportError, export};
+pub use export::{Design, ExportError, Safety, export};
 pub use plan::{Plan, PlanError};
 pub use system::{
     Driver, SystemDesign, SystemError, SystemPlan, export_driven, export_system, system_records,

@@ -5,6 +5,9 @@ use crate::circuit::{Circuit, Library};
 use crate::plan::Plan;
 use takt_isa::memory::{BlockRam, Shape};
 
+/// Check bits of a word with error correction (`ecc/takt_ecc_code.v`); a bank's parities are in bits that a block RAM has beside 32.
+const CHECK_BITS: u64 = 7;
+
 /// Block RAMs of a core.
 pub fn block_rams(plan: &Plan, library: &Library, block: &BlockRam) -> u64 {
     let machine = plan.machine;
@@ -12,8 +15,10 @@ pub fn block_rams(plan: &Plan, library: &Library, block: &BlockRam) -> u64 {
     let banks = machine.banks().map(|bank| Shape { words: bank.depth.into(), bits: 32 });
     let sources = plan.sources().count() as u64;
     let tables = plan.slots.iter().flat_map(|slot| &slot.circuits);
-    machine.code_block_rams(block)
-        + machine.data_block_rams(block)
+    let check = if plan.ecc { CHECK_BITS } else { 0 };
+    let words = machine.code_memories().chain([machine.data_memory()]);
+    let words = words.map(|memory| Shape { bits: memory.bits + check, ..memory });
+    words.map(|memory| block.blocks(memory)).sum::<u64>()
         + sources * banks.map(|bank| block.blocks(bank)).sum::<u64>()
         + tables.flat_map(|circuit| tables_of(circuit, library)).map(|table| block.blocks(table)).sum::<u64>()
 }

@@ -70,6 +70,13 @@ const STATUS: Register = Register {
             "The sticky flags: invalid, divide by zero, overflow, the last in the lowest bit.",
         ),
         field("differs", 13, 1, "With a second core: the cores have differed, since reset."),
+        field(
+            "upset",
+            14,
+            1,
+            "With error correction: a word of a memory was wrong and could not be corrected, since reset.",
+        ),
+        field("corrected", 15, 1, "With error correction: a word of a memory was corrected, since reset."),
         field("fault_address", 16, 16, "The bundle of the fault."),
     ],
 };
@@ -209,8 +216,8 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
             ("NONE", &(3 + half + 32)),
             ("REPLAY_AT", &padded(16, half, "replay_address")),
             ("TOP", &design.top),
-            ("DIFFERS_NET", &design.differs_net()),
-            ("DIFFERS", &design.differs_port()),
+            ("SAFETY_NETS", &design.safety.nets("")),
+            ("SAFETY", &design.safety.connections("")),
             ("STREAMS", &streams),
         ],
     )

@@ -149,10 +149,24 @@ impl Status {
         }
     }
 
+    /// Corrected words of memories since the core was started, at most 255; 0 without error correction.
+    pub fn corrections(self) -> u32 {
+        self.0 >> 24
+    }
+
     /// Causes that stopped the drive, and `trip`, which stops the peripherals that the wiring names.
     pub fn causes(self) -> impl Iterator<Item = &'static str> {
-        let names =
-            ["fault", "halt", "missed deadline", "host silent", "stop", "NaN output", TRIP, "cores differ"];
+        let names = [
+            "fault",
+            "halt",
+            "missed deadline",
+            "host silent",
+            "stop",
+            "NaN output",
+            TRIP,
+            "cores differ",
+            "memory error",
+        ];
         names.into_iter().enumerate().filter(move |(i, _)| self.0 >> (12 + i) & 1 != 0).map(|(_, name)| name)
     }
 }

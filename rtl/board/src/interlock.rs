@@ -62,6 +62,9 @@ impl Figures {
             ("cores differ", _) => {
                 "cores differ: the second core did not do what the first one did".to_owned()
             }
+            ("memory error", _) => {
+                "memory error: a word of a memory was wrong and could not be corrected".to_owned()
+            }
             ("stop", _) => "stop: the pin `stop` was 1, or open".to_owned(),
             ("NaN output", _) if self.nan.is_empty() => "NaN output: no output is NaN any more".to_owned(),
             ("NaN output", _) => format!("NaN output: {}", self.nan.join(", ")),

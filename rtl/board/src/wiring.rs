@@ -17,6 +17,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use takt_family::FAMILIES;
 use takt_isa::Type;
+use takt_rtl::Safety;
 use times::Times;
 
 /// Number of ports that an application lacks from which on the wiring is taken for another application's.
@@ -58,8 +59,8 @@ pub struct Wiring {
     pub host: u32,
     /// The device's own oscillator watches the clock; pins go off when it stops.
     pub clock_watch: bool,
-    /// Cycles by which a second core beside each one is later; `None` without second cores.
-    pub second_core: Option<u32>,
+    /// Mechanisms of every core against faults of the circuit.
+    pub safety: Safety,
     /// The host can read registers and data memory of the cores, which then have shadow memories.
     pub observe: bool,
     /// Pins of the board for the signals of [`SIGNALS`], in the order of that table.
@@ -213,7 +214,7 @@ impl Wiring {
             deadlines: 1,
             host: 0,
             clock_watch: false,
-            second_core: None,
+            safety: Safety::default(),
             observe: true,
             signals: [const { None }; SIGNALS.len()],
             carriers: Vec::new(),
@@ -532,6 +533,7 @@ impl<'a> Reader<'a> {
             table.reject_unknown_keys(&[]);
         }
         let second_core = top.table("second_core").map(|table| second_core(&table));
+        let ecc = top.boolean("ecc").is_some_and(|at| at.value);
         let flash = top.table("flash").and_then(|table| self.flash(&table));
         let scope = top.table("scope").map(|table| self.scope(&table));
         let mut peripherals = Vec::new();
@@ -554,7 +556,7 @@ impl<'a> Reader<'a> {
             deadlines,
             host,
             clock_watch,
-            second_core,
+            safety: Safety { ecc, second_core },
             observe,
             signals,
             tick: self.carriers.tick.map(|(tick, _)| tick),

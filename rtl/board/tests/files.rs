@@ -113,7 +113,7 @@ fn nothing_is_for_a_host_without_a_uart() {
 #[test]
 fn a_second_core_is_a_few_cycles_later() {
     let of = |more: &str| Wiring::read("robot.toml", &format!("{ALONE}\n{more}"), &ulx3s());
-    let delay = |more: &str| of(more).unwrap_or_else(|mistakes| panic!("{mistakes:?}")).second_core;
+    let delay = |more: &str| of(more).unwrap_or_else(|mistakes| panic!("{mistakes:?}")).safety.second_core;
     assert_eq!(delay(""), None);
     assert_eq!(delay("[second_core]\n"), Some(2));
     assert_eq!(delay("[second_core]\ndelay = 4\n"), Some(4));

@@ -6,6 +6,7 @@ mod clock;
 mod consistency;
 mod devices;
 mod drive;
+mod ecc;
 mod emulated;
 mod families;
 mod family;

@@ -4,9 +4,10 @@
 // Contract
 //   drive is 1 from the first published outputs on, while enable is 1, until something trips it: a fault or halt of the program, an
 //   output that is no number (nan), DEADLINES missed deadlines one after the other, HOST periods without a request of the host (0: any
-//   number), stop, a second core that does something else (differs), or a reset of the core.
+//   number), stop, a second core that does something else (differs), a wrong word in a memory (upset),
+//   or a reset of the core.
 //   cause says what did, until the next reset of the core: bit 0 fault, 1 halt, 2 deadline, 3 host, 4 stop, 5 an output that is
-//   no number, 7 differs; 6 is 0.
+//   no number, 7 differs, 8 upset; 6 is 0.
 //   missed, done, heard: high for a cycle each. misses counts missed deadlines since reset.
 
 module takt_interlock #(
@@ -25,8 +26,9 @@ module takt_interlock #(
     input  wire        stop,
     input  wire        nan,
     input  wire        differs,
+    input  wire        upset,
     output reg         drive,
-    output wire [7:0]  cause,
+    output wire [8:0]  cause,
     output reg  [31:0] misses
 );
 
@@ -44,9 +46,9 @@ module takt_interlock #(
     wire [ROW-1:0] in_row = row + ONE_MORE;
     wire        late  = missed & in_row == MOST;
     wire        alone = HOST != 0 & silence == QUIET & ~heard;
-    wire [6:0]  now   = {differs, nan, stop, alone, late, halted, fault};
-    reg  [6:0]  was;
-    assign cause = {was[6], 1'b0, was[5:0]};
+    wire [7:0]  now   = {upset, differs, nan, stop, alone, late, halted, fault};
+    reg  [7:0]  was;
+    assign cause = {was[7:6], 1'b0, was[5:0]};
 
     always @(posedge clk) begin
         if (missed) begin
@@ -62,7 +64,7 @@ module takt_interlock #(
         was   <= was | now;
         drive <= enable & published & ~|was & ~|now;
         if (rst) begin
-            {drive, published, was} <= 9'd0;
+            {drive, published, was} <= 10'd0;
             row     <= 0;
             silence <= 0;
             misses <= 32'd0;

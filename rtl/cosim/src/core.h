@@ -1,5 +1,5 @@
 // Driver of a core by itself. The generated part before it defines SLOTS, RESET_CYCLES, OUTPUTS, LATCHED, REGISTERS and the output ports
-// by slot, and PAIR for a pair.
+// by slot, PAIR for a pair, and ECC for error correction.
 //
 //   3 load   count, then that many (space, slot, address, low, high); space 3 is an input port. Resets, then loads
 
@@ -68,6 +68,12 @@ static void look(bool watch) {
 #ifdef PAIR
     if (watch && top->differs) {
         fprintf(stderr, "the cores of the pair differ in cycle %lld\n", (long long)cycle);
+        exit(1);
+    }
+#endif
+#ifdef ECC
+    if (watch && (top->upset || top->corrections)) {
+        fprintf(stderr, "a word of a memory is wrong in cycle %lld\n", (long long)cycle);
         exit(1);
     }
 #endif

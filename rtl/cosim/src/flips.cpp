@@ -1,4 +1,4 @@
-// Flips bits of a pair of cores, one at a time, and reports what became of each: the counterpart of `flips.rs`.
+// Flips bits of a core, or of a pair, one at a time, and reports what became of each: the counterpart of `flips.rs`.
 //
 // A stand-in for takt_exchange writes the input ports at each tick and reads the output ports when the program publishes. A first run
 // without a flip records, for each cycle, what leaves the first core, and every STEP cycles the state. A flip starts from a recorded
@@ -7,12 +7,13 @@
 // stdin, words of 32 bits, little-endian:
 //   records count, then (space, slot, address, low, high) each; inputs count, their numbers; outputs count, their numbers, and for each
 //   whether it is a float; cycles of a period; periods; a row of inputs for each period; horizon in periods;
-//   after the answer, for each flip: register, bit, cycle; or ffffffff to end
+//   after the answer, for each flip: register, cycle, count of bits, bits; or ffffffff to end
 // stdout:
 //   count of registers, then for each bits, words of a memory (0: flip-flops), length of the name, the name a character a word;
-//   first and last cycle for a flip; then for each flip: cycle of the first difference of what leaves the first core, cycle of `differs`,
+//   first and last cycle for a flip; then for each flip: cycle of the first difference of what leaves the (first) core, cycle of `differs` or
+//   `upset`,
 //   cycle in which the first core itself stops or misses its deadline, or shows a NaN (0 for none: cycles start at 1); 1 if the state was
-//   as if there had been no flip
+//   as if there had been no flip; 1 if a word was corrected
 
 #include "Vcircuit.h"
 #include "verilated.h"
@@ -61,6 +62,7 @@ struct Register {
     unsigned bits, words;  // words: of a memory; 0 for flip-flops
     size_t size, entry;    // bytes, and those of a word
     bool first;            // it is the first core's
+    bool counts;           // it counts corrections, and nothing follows from it
 };
 static std::vector<Register> registers;
 
@@ -70,9 +72,9 @@ static void find_registers() {
         const VerilatedVarNameMap *vars = scope.second->varsp();
         if (!vars) continue;
         std::string path = scope.first;
-        size_t at = path.find(PAIR);
+        size_t at = path.find(TOP);
         if (at == std::string::npos) continue;
-        path = path.substr(at + sizeof PAIR - 1);
+        path = path.substr(at + sizeof TOP - 1);
         if (!path.empty()) path = path.substr(1) + ".";
         for (const auto &entry : *vars) {
             const VerilatedVar &var = entry.second;
@@ -84,7 +86,12 @@ static void find_registers() {
             own.words = var.udims() ? var.unpacked().elements() : 0;
             own.size = var.totalSize();
             own.entry = var.udims() ? own.size / own.words : own.size;
+#ifdef PAIR
             own.first = own.name.compare(0, 6, "first.") == 0;
+#else
+            own.first = true;
+#endif
+            own.counts = own.name.find("report.corrections") != std::string::npos;
             sorted[own.name] = own;
         }
     }
@@ -111,7 +118,7 @@ struct Left {
 
 struct Seen {
     Left left;
-    bool differs, stops;
+    bool told, stops, corrected;
 };
 
 static Seen pass() {
@@ -132,7 +139,14 @@ static Seen pass() {
     Seen seen;
     uint32_t value = reads ? top->read_value : 0;
     seen.left = {a.phase, a.number, value, top->stored, top->stored ? top->stored_address : 0u, top->stored ? top->stored_value : 0u};
-    seen.differs = top->differs;
+    seen.told = seen.corrected = false;
+#ifdef PAIR
+    seen.told |= top->differs;
+#endif
+#ifdef ECC
+    seen.told |= top->upset;
+    seen.corrected = top->corrections != 0;
+#endif
     bool idle = a.phase == REST && top->waiting;
     bool nan = reads && output_floats[a.number] && (value & 0x7fffffff) > 0x7f800000;
     seen.stops = top->fault || top->halted || nan || (tick && !idle);
@@ -211,7 +225,7 @@ static bool is(const State &state, bool first) {
     if (memcmp(&around, &state.around, sizeof around)) return false;
     const uint8_t *at = state.bytes.data();
     for (const Register &own : registers) {
-        if ((!first || own.first) && memcmp(own.data, at, own.size)) return false;
+        if ((!first || own.first) && !own.counts && memcmp(own.data, at, own.size)) return false;
         at += own.size;
     }
     return true;
@@ -267,7 +281,7 @@ int main(int argc, char **argv) {
         if (cycle % STEP == 0) states.push_back(keep());
         Seen seen = pass();
         if (!around.ready) ready = cycle + 1;
-        if (seen.differs) fails("without a flip, the cores differ", cycle);
+        if (seen.told || seen.corrected) fails("without a flip, a mechanism tells", cycle);
         if (seen.stops) fails("without a flip, the program stops or misses its deadline", cycle);
         if (ready > 1000000) fails("the program does not wait", cycle);
         golden.push_back(seen.left);
@@ -295,32 +309,35 @@ int main(int argc, char **argv) {
 
     for (uint32_t index; (index = need()) != 0xffffffff;) {
         const Register &own = registers.at(index);
-        size_t bit = need(), from = need();
+        size_t from = need();
+        std::vector<uint32_t> bits = need(need());
         restore(states[from / STEP]);
         for (size_t cycle = from / STEP * STEP; cycle < from; cycle++) pass();
-        own.data[bit / own.bits * own.entry + bit % own.bits / 8] ^= 1 << bit % own.bits % 8;
-        uint32_t harmful = 0, differs = 0, stops = 0, same = 0;
+        for (size_t bit : bits) own.data[bit / own.bits * own.entry + bit % own.bits / 8] ^= 1 << bit % own.bits % 8;
+        uint32_t harmful = 0, told = 0, stops = 0, same = 0, corrected = 0;
         size_t end = from + size_t(horizon) * period;
         for (size_t cycle = from; cycle < end; cycle++) {
             if (cycle > from && cycle % STEP == 0) {
                 const State &state = states[cycle / STEP];
                 same = is(state, false);
-                if (same || (differs && is(state, true))) break;
+                if (same || (told && is(state, true))) break;
             }
             Seen seen = pass();
             if (!harmful && seen.left != golden[cycle]) {
                 harmful = cycle + 1;
                 end = cycle + period;  // in which it may be told
             }
-            if (!differs && seen.differs) differs = cycle + 1;
+            if (!told && seen.told) told = cycle + 1;
+            corrected |= seen.corrected;
             if (!stops && seen.stops) stops = cycle + 1;
-            // A pair that has differed has told; the core's own means may still come.
-            if (harmful && differs && stops) break;
+            // A mechanism has told; the core's own means may still come.
+            if (harmful && told && stops) break;
         }
         put(harmful);
-        put(differs);
+        put(told);
         put(stops);
         put(same);
+        put(corrected);
         fflush(stdout);
     }
     return 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Bits of a pair of cores flipped, one at a time: what leaves the first core then, and whether the second one tells.
+//! Bits of a core flipped, one at a time: what leaves it then, and whether the second core or the error correction tells.
 
 use crate::simulation::{ModelError, Process};
 use std::path::{Path, PathBuf};
@@ -9,12 +9,12 @@ use takt_rtl::Design;
 use takt_rtl::export::RESET_CYCLES;
 use takt_rtl::verilator::Sources;
 
-/// Main program around a pair: the counterpart of [`Flips`].
+/// Main program around a core, or a pair: the counterpart of [`Flips`].
 const DRIVER: &str = include_str!("flips.cpp");
 /// Number that ends the flips.
 const END: u32 = u32::MAX;
 
-/// A pair compiled for flips.
+/// A core with mechanisms against faults, compiled for flips.
 #[derive(Clone, Debug)]
 pub struct FlipModel(PathBuf);
 
@@ -32,7 +32,7 @@ pub struct Stimulus {
 /// Register of the circuit: flip-flops or a memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FlipRegister {
-    /// Hierarchical name below the pair.
+    /// Hierarchical name below the top.
     pub name: String,
     /// Bits of a word.
     pub bits: u32,
@@ -45,15 +45,17 @@ pub struct FlipRegister {
 pub struct Outcome {
     /// First cycle in which a value that the exchange reads, or a memory write of the first core, is not that of the run without a flip.
     pub harmful: Option<u32>,
-    /// First cycle in which the pair's `differs` is 1.
-    pub differs: Option<u32>,
+    /// First cycle in which `differs` or `upset` is 1.
+    pub told: Option<u32>,
     /// First cycle in which the first core stops with a fault or halts, misses its deadline, or has an output that is NaN.
     pub stops: Option<u32>,
     /// The flip left nothing behind.
     pub is_over: bool,
+    /// A word was corrected.
+    pub is_corrected: bool,
 }
 
-/// A program running on a pair whose bits are flipped.
+/// A program running on a core whose bits are flipped.
 #[derive(Debug)]
 pub struct Flips {
     process: Process,
@@ -71,7 +73,7 @@ impl FlipRegister {
 }
 
 impl FlipModel {
-    /// Compiles a pair, or finds an earlier build in the folder.
+    /// Compiles a design, or finds an earlier build in the folder.
     ///
     /// # Errors
     /// If Verilator or a C++ compiler is missing or fails.
@@ -83,8 +85,14 @@ impl FlipModel {
                 kept += &format!("public_flat_rw -module \"{module}\" -var \"{name}\"\n");
             }
         }
-        let header =
-            format!("#define PAIR \"{}\"\n#define RESET_CYCLES {RESET_CYCLES}\n{DRIVER}", design.top);
+        let mut header = format!("#define TOP \"{}\"\n#define RESET_CYCLES {RESET_CYCLES}\n", design.top);
+        if design.safety.second_core.is_some() {
+            header += "#define PAIR\n";
+        }
+        if design.safety.ecc {
+            header += "#define ECC\n";
+        }
+        header += DRIVER;
         let files = design.files.iter().map(|file| (file.name.as_str(), file.text.as_str()));
         let mut sources = Sources {
             name: "flips",
@@ -105,7 +113,7 @@ impl FlipModel {
     /// Runs a program without a flip, so that its bits can be flipped.
     ///
     /// # Errors
-    /// If the process ends: the program must neither stop nor miss a deadline, and the cores must not differ.
+    /// If the process ends: the program must neither stop nor miss a deadline, and no mechanism may tell.
     pub fn start(&self, program: &Program, stimulus: &Stimulus) -> Result<Flips, ModelError> {
         let machine = program.machine;
         let records = load_records(program);
@@ -143,19 +151,21 @@ impl FlipModel {
 }
 
 impl Flips {
-    /// Flips a bit of a register, by its number, at the beginning of a cycle.
+    /// Flips bits of a register, by its number, at the beginning of a cycle.
     ///
     /// # Errors
     /// If the process has ended.
-    pub fn flip(&mut self, register: usize, bit: u32, cycle: u32) -> Result<Outcome, ModelError> {
-        self.process.send(&[register as u32, bit, cycle])?;
-        let words = self.process.receive(4)?;
+    pub fn flip(&mut self, register: usize, bits: &[u32], cycle: u32) -> Result<Outcome, ModelError> {
+        let words = [&[register as u32, cycle, bits.len() as u32], bits].concat();
+        self.process.send(&words)?;
+        let words = self.process.receive(5)?;
         let cycle = |word: u32| word.checked_sub(1);
         Ok(Outcome {
             harmful: cycle(words[0]),
-            differs: cycle(words[1]),
+            told: cycle(words[1]),
             stops: cycle(words[2]),
             is_over: words[3] != 0,
+            is_corrected: words[4] != 0,
         })
     }
 }

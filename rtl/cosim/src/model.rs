@@ -26,12 +26,13 @@ fn header(design: &Design) -> String {
     let slots = design.machine.slots;
     let mut text = format!(
         "#define SLOTS {}\n#define RESET_CYCLES {RESET_CYCLES}\n#define OUTPUTS {}\n#define LATCHED {}\n\
-         #define REGISTERS {}\n{}template <class F> static void outputs(F f) {{\n",
+         #define REGISTERS {}\n{}{}template <class F> static void outputs(F f) {{\n",
         slots.len(),
         design.machine.outputs_per_bank,
         design.latched,
         Register::COUNT,
-        if design.second.is_some() { "#define PAIR\n" } else { "" }
+        if design.safety.second_core.is_some() { "#define PAIR\n" } else { "" },
+        if design.safety.ecc { "#define ECC\n" } else { "" }
     );
     for (s, slot) in slots.iter().enumerate() {
         let (b, first) = (slot.bank.name, slot.bank.base + slot.bank.depth - design.machine.outputs_per_bank);

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Flips of every flip-flop of the first core of a pair of t1, and of a sample of its other bits: the second core tells of every harmful one.
+//! Flips in memories with error correction: none is harmful, or it is told.
 #![allow(clippy::print_stdout)]
 
 use crate::common::{assemble, folder};
+use crate::ecc;
 use crate::pair::{DELAY, pair};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
@@ -21,7 +23,7 @@ const MEMORY: u32 = 32;
 const OTHERS: u32 = 5;
 /// Flip-flops from one flip to the next, so that few flips are of all structures; a prime.
 const STRIDE: u64 = 7919;
-/// Cycles from a difference at the first core's ports to `differs`.
+/// Cycles from a difference at the first core's ports to `differs`, and more than to `upset`.
 const TOLD: u32 = DELAY + 2;
 
 /// A program whose bits are flipped.
@@ -140,11 +142,11 @@ fn count(counts: &mut Counts, structure: String, at: u32, period: u32, outcome: 
     let own = counts.entry(structure).or_default();
     let mut add = |name| *own.entry(name).or_default() += 1;
     add("flips");
-    let Outcome { harmful, differs, stops, is_over } = outcome;
-    if differs.is_some() {
+    let Outcome { harmful, told, stops, is_over, is_corrected } = outcome;
+    if told.is_some() {
         add("told");
     }
-    if let Some(cycle) = differs {
+    if let Some(cycle) = told {
         add(match cycle - at {
             0..10 => "told_within_10",
             10..100 => "told_within_100",
@@ -152,21 +154,24 @@ fn count(counts: &mut Counts, structure: String, at: u32, period: u32, outcome: 
             _ => "told_later",
         });
     }
+    if is_corrected {
+        add("corrected");
+    }
     match harmful {
         Some(wrong) => {
             add("harmful");
             let in_time = |by: Option<u32>| by.is_some_and(|cycle| cycle <= wrong + period);
-            if in_time(differs) {
+            if in_time(told) {
                 add("harmful_told");
             }
-            if differs.is_some_and(|cycle| cycle <= wrong + TOLD) {
+            if told.is_some_and(|cycle| cycle <= wrong + TOLD) {
                 add("harmful_told_before_a_pin");
             }
             if in_time(stops) {
                 add("harmful_stopped");
             }
         }
-        None if differs.is_some() => {}
+        None if told.is_some() || is_corrected => {}
         None if is_over => add("masked"),
         None => add("silent"),
     }
@@ -206,10 +211,10 @@ fn run(case: &Case, model: &FlipModel, (first, flips): (u64, u64), only: &str) -
             by_turns(&first_core)
         };
         let cycle = begin + random.next_u32() % (end - begin);
-        let outcome = simulation.flip(register, bit, cycle).unwrap_or_else(|error| panic!("{error}"));
+        let outcome = simulation.flip(register, &[bit], cycle).unwrap_or_else(|error| panic!("{error}"));
         let of = structure(&simulation.registers[register]);
         assert!(!of.starts_with("second") || outcome.harmful.is_none(), "{of}: {outcome:?}");
-        if outcome.harmful.is_some_and(|wrong| outcome.differs.is_none_or(|told| told > wrong + TOLD)) {
+        if outcome.harmful.is_some_and(|wrong| outcome.told.is_none_or(|told| told > wrong + TOLD)) {
             let name = &simulation.registers[register].name;
             late.push(format!("{}: bit {bit} of {name}, flipped in cycle {cycle}: {outcome:?}", case.name));
         }
@@ -266,4 +271,79 @@ fn a_comparison_that_leaves_something_out_is_found() {
     let (counts, late) = run(&case, &build(&design), (0, 2000), "first.outputs.g_bank");
     let (harmful, told) = (sum(&counts, "harmful"), sum(&counts, "harmful_told"));
     assert!(harmful > 20 && told < harmful / 2 && late.len() as u64 >= harmful - told, "{counts:#?}");
+}
+
+/// Structures whose words have codes.
+const CODED: [&str; 3] = ["memory_program", "memory_data", "memory_registers"];
+
+/// Flips of one or two bits of random words of the memories of a core with error correction.
+fn run_coded(case: &Case, model: &FlipModel, first: u64, flips: u64, bits: usize) -> Counts {
+    let mut counts = Counts::default();
+    let mut simulation =
+        model.start(&case.program, &case.stimulus).unwrap_or_else(|error| panic!("{}: {error}", case.name));
+    let named =
+        |own: &FlipRegister| structure(&FlipRegister { name: format!("first.{}", own.name), ..own.clone() });
+    let coded = |own: &FlipRegister| own.words > 0 && CODED.iter().any(|name| named(own).ends_with(name));
+    let all = simulation.registers.iter().enumerate().filter(|(_, own)| coded(own));
+    let memories: Vec<(usize, FlipRegister)> = all.map(|(i, own)| (i, own.clone())).collect();
+    assert_eq!(memories.len(), 1 + 1 + 3 * 2, "program, data, three copies of two banks");
+    let mut random = Pcg64Mcg::seed_from_u64(first);
+    let (begin, end) = simulation.cycles;
+    for _ in 0..flips {
+        let (register, own) = &memories[random.next_u32() as usize % memories.len()];
+        let word = random.next_u32() % own.words;
+        let one = random.next_u32() % own.bits;
+        let other = (one + 1 + random.next_u32() % (own.bits - 1)) % own.bits;
+        let flipped: Vec<u32> = [one, other].iter().take(bits).map(|bit| word * own.bits + bit).collect();
+        let cycle = begin + random.next_u32() % (end - begin);
+        let outcome = simulation.flip(*register, &flipped, cycle).unwrap_or_else(|error| panic!("{error}"));
+        let structure = named(own);
+        let of = structure.trim_start_matches("first.");
+        let in_time =
+            outcome.harmful.is_none_or(|wrong| outcome.told.is_some_and(|told| told <= wrong + TOLD));
+        let place = || {
+            format!("{}: bits {flipped:?} of {}, flipped in cycle {cycle}: {outcome:?}", case.name, own.name)
+        };
+        // Two wrong bits of a byte have the right parity.
+        let is_hidden = bits == 2 && of == "memory_registers";
+        assert!(in_time || is_hidden, "{}", place());
+        // A single wrong bit of program or data never stops the program.
+        assert!(
+            bits == 2 || of == "memory_registers" || outcome.harmful.or(outcome.told).is_none(),
+            "{}",
+            place()
+        );
+        count(&mut counts, of.to_owned(), cycle, case.stimulus.period, outcome);
+    }
+    counts
+}
+
+/// Flips `TAKT_FLIPS` words (by default 300) of memories with error correction in each program, from number `TAKT_SEED` on.
+#[test]
+fn wrong_words_are_corrected_or_told() {
+    let number =
+        |name: &str, usual| std::env::var(name).map_or(usual, |text| text.parse::<u64>().expect("a number"));
+    let (first, flips) = (number("TAKT_SEED", 0), number("TAKT_FLIPS", 300));
+    let model = build(&ecc::design(&T1, 0, None));
+    for mut case in cases() {
+        // The scrubber reads all memories in a wait of 2048 words, nine cycles each.
+        if case.name == "blink" {
+            case.stimulus.period = 20_000;
+            case.stimulus.rows.truncate(4);
+        }
+        for (bits, name) in [(1, "one"), (2, "two")] {
+            let counts = run_coded(&case, &model, first, flips, bits);
+            for (structure, own) in &counts {
+                let words =
+                    own.iter().map(|(of, count)| format!("{}.{name}.{structure}.{of}={count}", case.name));
+                println!("figures: {}", words.collect::<Vec<_>>().join(" "));
+                if case.name == "blink" && bits == 1 {
+                    // Input ports are detected, not repaired.
+                    let (flips, corrected) = (own["flips"], own.get("corrected").copied().unwrap_or(0));
+                    let all = structure == "memory_registers";
+                    assert!(corrected == flips || all && corrected > flips / 3, "{structure}: {own:?}");
+                }
+            }
+        }
+    }
 }

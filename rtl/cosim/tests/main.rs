@@ -4,6 +4,7 @@
 mod axi;
 mod bus;
 mod common;
+mod ecc;
 mod faults;
 mod flips;
 mod icarus;

@@ -5,14 +5,15 @@ use crate::common::{assemble, folder};
 use crate::lockstep::track;
 use takt_cosim::{Lockstep, Model, Simulation, random};
 use takt_isa::{Machine, Program, T1, T3};
-use takt_rtl::{Design, Library, export};
+use takt_rtl::{Design, Library, Safety, export};
 
 /// Cycles by which second cores are later.
 pub(crate) const DELAY: u32 = 2;
 
 pub(crate) fn pair(machine: &'static Machine, latched: u16) -> Design {
     let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
-    design.latching(latched).and_then(|design| design.paired(DELAY)).expect("every core can be a pair")
+    let safety = Safety { second_core: Some(DELAY), ..Safety::default() };
+    design.latching(latched).and_then(|design| design.with(safety)).expect("every core can be a pair")
 }
 
 fn start(design: &Design) -> Simulation {

@@ -121,28 +121,51 @@ fn memory(plan: &Plan, m: &mut Module) {
     m.wires([plan.load_valid(), plan.port_fault()]);
     m.wires([plan.load_result()]);
     m.wires([plan.memory_address()]);
-    m.instance(
-        Instance::new("takt_memory", "memory")
-            .parameter("LATENCY", unit.map_or(0, |unit| unit.latency))
-            .parameter("DEPTH", plan.machine.data_depth)
-            .parameter("ADDRESS", plan.data_bits)
-            .parameter("PORTS", plan.ports())
-            .same([net::CLK, net::RST])
-            .port("load_write", net::LOAD_DATA)
-            .port("load_address", net::LOADS_ADDRESS.low(plan.data_bits))
-            .port("load_value", net::LOADS_VALUE.low(32))
-            .same([plan.x_load(), net::X_STORE])
-            .port("offset", plan.x_offset())
-            .port("a", concat(plan.memory().map(|slot| slot.operand(0)).collect::<Vec<_>>()))
-            .port("b", storing.operand(1))
-            .port("cancel", net::FAULT)
-            .port("fault", plan.port_fault())
-            .port("out_valid", plan.load_valid())
-            .port("result", plan.load_result())
-            .port("write", net::STORED)
-            .port("address", plan.memory_address())
-            .port("value", net::STORED_VALUE),
-    );
+    let memory = Instance::new("takt_memory", "memory")
+        .parameter("LATENCY", unit.map_or(0, |unit| unit.latency))
+        .parameter("DEPTH", plan.machine.data_depth)
+        .parameter("ADDRESS", plan.data_bits)
+        .parameter("PORTS", plan.ports())
+        .same([net::CLK])
+        .port("load_write", net::LOAD_DATA)
+        .port("load_value", net::LOADS_VALUE.low(32))
+        .same([plan.x_load(), net::X_STORE])
+        .port("offset", plan.x_offset())
+        .port("a", concat(plan.memory().map(|slot| slot.operand(0)).collect::<Vec<_>>()))
+        .port("b", storing.operand(1))
+        .port("cancel", net::FAULT)
+        .port("fault", plan.port_fault())
+        .port("out_valid", plan.load_valid())
+        .port("result", plan.load_result())
+        .port("address", plan.memory_address())
+        .port("value", net::STORED_VALUE);
+    let of_loader = net::LOADS_ADDRESS.low(plan.data_bits);
+    if plan.ecc {
+        m.wires([plan.data_one_wrong(), plan.data_two_wrong()]);
+        m.wires([net::DATA_WRITES]);
+        m.instance(
+            memory
+                .parameter("ECC", 1)
+                .port("rst", net::RST | net::SCRUBS)
+                .port(
+                    "load_address",
+                    choose(net::SCRUBS & !net::LOADS, plan.scrub_address().low(plan.data_bits), of_loader),
+                )
+                .port("write", net::DATA_WRITES)
+                .port("one_wrong", plan.data_one_wrong())
+                .port("two_wrong", plan.data_two_wrong())
+                .port("corrected", net::DATA_CORRECTED),
+        );
+        m.assign(net::STORED, net::DATA_WRITES & !net::REPAIRED);
+    } else {
+        m.instance(
+            memory.same([net::RST]).port("load_address", of_loader).port("write", net::STORED).open([
+                "one_wrong",
+                "two_wrong",
+                "corrected",
+            ]),
+        );
+    }
     m.unused(plan.load_unused(), plan.load_valid(), None);
     let at_fault =
         |slot: &SlotPlan| plan.port_of(slot).map_or(decimal(1, 0_u32), |port| plan.port_fault().at(port));

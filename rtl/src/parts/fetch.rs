@@ -22,13 +22,11 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
 }
 
 fn memory(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
-    m.wires([slot.fetched()]);
-    m.regs([slot.word()]);
     let loads = net::LOADS
         & Expr::from(net::LOADS_SPACE).is(decimal(2, 0_u32))
         & Expr::from(net::LOADS_SLOT).is(decimal(3, slot.number));
-    m.instance(
-        Instance::new("takt_program", slot.program())
+    let memory = |module: &str| {
+        Instance::new(module, slot.program())
             .parameter("DEPTH", plan.machine.code_depth)
             .parameter("ADDRESS", plan.code_bits)
             .parameter("LOW", slot.slot.low_zeros())
@@ -38,8 +36,31 @@ fn memory(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
             .port("write_word", net::LOADS_VALUE)
             .port("read", net::FLUSH | net::ADVANCE)
             .port("read_address", plan.fetch())
-            .port("word", slot.fetched()),
-    );
+    };
+    if plan.ecc {
+        m.wires([slot.word()]);
+        m.wires([
+            slot.word_one_wrong(),
+            slot.word_two_wrong(),
+            slot.scrub_one_wrong(),
+            slot.scrub_two_wrong(),
+        ]);
+        m.instance(
+            memory("takt_ecc_program")
+                .same([net::ADVANCE])
+                .port("word", slot.word())
+                .port("one_wrong", slot.word_one_wrong())
+                .port("two_wrong", slot.word_two_wrong())
+                .port("scrub_address", plan.scrub_address().low(plan.code_bits))
+                .port("scrubbed", slot.scrubbed())
+                .port("scrub_one_wrong", slot.scrub_one_wrong())
+                .port("scrub_two_wrong", slot.scrub_two_wrong()),
+        );
+        return;
+    }
+    m.wires([slot.fetched()]);
+    m.regs([slot.word()]);
+    m.instance(memory("takt_program").port("word", slot.fetched()));
     m.clocked(vec![when(net::ADVANCE, vec![set(slot.word(), slot.fetched())])]);
 }
 

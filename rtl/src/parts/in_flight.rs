@@ -18,7 +18,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
         for late in &slot.late {
             late_unit(slot, late, m);
         }
-        places(slot, m);
+        places(plan, slot, m);
     }
     m.blank();
     together(plan, m);
@@ -62,7 +62,7 @@ fn late_unit(slot: &SlotPlan, late: &LateUnit, m: &mut Module) {
 }
 
 /// Generates the shift register of a slot.
-fn places(slot: &SlotPlan, m: &mut Module) {
+fn places(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
     // At most one iterative unit's result enters the last place in a cycle, since they share the write port (rule 6).
     let select = |what: &dyn Fn(&LateUnit) -> Net, width: u32| match slot.late.as_slice() {
         [] => decimal(width, 0_u32),
@@ -90,7 +90,8 @@ fn places(slot: &SlotPlan, m: &mut Module) {
         Instance::new("takt_in_flight", slot.results())
             .parameter("DEPTH", slot.depth)
             .parameter("INDEX", index)
-            .same([net::CLK, net::RST])
+            .same([net::CLK])
+            .port("rst", if plan.ecc { net::RST | slot.load() } else { net::RST.into() })
             .port("cancel", net::FAULT)
             .port("load", slot.load())
             .port("load_index", net::LOADS_ADDRESS.low(index))

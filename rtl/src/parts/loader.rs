@@ -3,7 +3,7 @@
 
 use crate::plan::Plan;
 use crate::plan::names::net;
-use crate::verilog::{Expr, Module, concat, decimal, set};
+use crate::verilog::{Expr, Module, choose, concat, decimal, set};
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("loader and input ports");
@@ -31,12 +31,25 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
         0 => Expr::from(plan.input_index()),
         _ => concat([plan.input_index().into(), decimal(missing, base >> plan.input_bits)]),
     };
+    let (loads, [space, slot, address, value]) = if plan.ecc {
+        let either = [
+            (net::REPAIR_SPACE, net::LOAD_SPACE),
+            (net::REPAIR_SLOT, net::LOAD_SLOT),
+            (net::REPAIR_ADDRESS, net::LOAD_ADDRESS),
+            (net::REPAIR_VALUE, net::LOAD_VALUE),
+        ]
+        .map(|(repair, input)| choose(net::REPAIRS, repair, input));
+        (net::REPAIRS | (net::LOAD & net::RST), either)
+    } else {
+        let loader = [net::LOAD_SPACE, net::LOAD_SLOT, net::LOAD_ADDRESS, net::LOAD_VALUE];
+        (net::LOAD & net::RST, loader.map(Expr::from))
+    };
     m.clocked(vec![
-        set(net::LOADS, net::LOAD & net::RST),
-        set(net::LOADS_SPACE, net::LOAD_SPACE),
-        set(net::LOADS_SLOT, net::LOAD_SLOT),
-        set(net::LOADS_ADDRESS, net::LOAD_ADDRESS),
-        set(net::LOADS_VALUE, net::LOAD_VALUE),
+        set(net::LOADS, loads),
+        set(net::LOADS_SPACE, space),
+        set(net::LOADS_SLOT, slot),
+        set(net::LOADS_ADDRESS, address),
+        set(net::LOADS_VALUE, value),
         set(net::INPUT1, net::INPUT_WRITE),
         set(plan.input1_index(), index),
         set(net::INPUT1_VALUE, net::INPUT_VALUE),
@@ -50,6 +63,12 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
         let bank = slot.slot.bank;
         let log = bank.depth.trailing_zeros();
         let within = net::LOADS_ADDRESS.slice(15, log).is(decimal(16 - log, bank.base >> log));
-        m.define(slot.load(), net::LOAD_REGISTER & within);
+        // A repair is dropped if its write were in the cycle in which the first bundle after the tick reads.
+        let writes = if plan.ecc {
+            !(net::SCRUBS & net::TICK) & net::LOAD_REGISTER
+        } else {
+            net::LOAD_REGISTER.into()
+        };
+        m.define(slot.load(), writes & within);
     }
 }

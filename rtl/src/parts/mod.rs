@@ -3,6 +3,7 @@
 
 mod control;
 mod decoder;
+mod ecc;
 mod execute;
 mod fetch;
 mod hazards;
@@ -32,6 +33,9 @@ pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
     let mut m = Module::new(&plan.top(), heading(plan), ports::ports(plan));
     takes_parameters(&mut m, latched);
     control::parameters(plan, &mut m);
+    if plan.ecc {
+        ecc::declare(plan, &mut m);
+    }
     loader::write(plan, &mut m);
     fetch::write(plan, &mut m);
     control::write(plan, &mut m);
@@ -41,6 +45,9 @@ pub(crate) fn core(plan: &Plan, latched: u16) -> Result<String, ModuleError> {
     execute::write(plan, &mut m);
     status::write(plan, &mut m);
     write_back::write(plan, &mut m);
+    if plan.ecc {
+        ecc::write(plan, &mut m);
+    }
     m.finish()
 }
 

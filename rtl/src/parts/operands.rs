@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the source operands: copies of the register banks, forwarding, hazard detection (rule 2).
 
+use super::ecc;
 use crate::plan::names::net;
 use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
 use crate::verilog::{Expr, Instance, Module, concat, decimal, gated, no};
@@ -40,38 +41,52 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, number: u32, m: &mut Mod
     };
     m.wires([slot.operand(operand)]);
     m.wires([Stage::Read, Stage::Issue].map(|stage| slot.source_waits(stage, operand)));
-    m.instance(
-        Instance::new("takt_source", slot.source(operand))
-            .parameter("SLOTS", plan.slots.len() as u32)
-            .parameter("DEPTH", plan.depth)
-            .parameter("LATE", plan.late)
-            .parameter("INDEX", plan.index)
-            .parameter_as("LATCHED", &net::LATCHED)
-            .parameter("INPUTS", plan.input_bits)
-            .same([net::CLK, net::ADVANCE])
-            .port("m_bank", slot.source_bank(Stage::Match, operand))
-            .port("m_index", slot.source_index(Stage::Match, operand))
-            .port("m_place", plan.place(Stage::Match).at(number))
-            .same([plan.in_flight(), plan.in_flight_index(), plan.writes(), plan.late(), plan.late_index()])
-            .same(
-                [Stage::Read, Stage::Issue]
-                    .into_iter()
-                    .flat_map(|stage| [plan.writes_at(stage), plan.early_at(stage), plan.dest_at(stage)]),
-            )
-            .same([plan.result(), plan.was_result()])
-            .port("input_write", net::INPUT1)
-            .port("input_write_place", net::INPUT1_PLACE)
-            .port("input_now", net::INPUT1_NOW)
-            .port("input_write_index", plan.input1_index())
-            .port("input_write_value", net::INPUT1_VALUE)
-            .port("input_next_value", net::INPUT2_VALUE)
-            .port("r_constant", constant)
-            .port("i_reads_status", reads_status)
-            .port("i_status", status)
-            .port("r_waits", slot.source_waits(Stage::Read, operand))
-            .port("i_waits", slot.source_waits(Stage::Issue, operand))
-            .port("operand", slot.operand(operand)),
-    );
+    let source = Instance::new("takt_source", slot.source(operand))
+        .parameter("SLOTS", plan.slots.len() as u32)
+        .parameter("DEPTH", plan.depth)
+        .parameter("LATE", plan.late)
+        .parameter("INDEX", plan.index)
+        .parameter_as("LATCHED", &net::LATCHED)
+        .parameter("INPUTS", plan.input_bits)
+        .same([net::CLK, net::ADVANCE])
+        .port("m_bank", slot.source_bank(Stage::Match, operand))
+        .port("m_index", slot.source_index(Stage::Match, operand))
+        .port("m_place", plan.place(Stage::Match).at(number))
+        .same([plan.in_flight(), plan.in_flight_index(), plan.writes(), plan.late(), plan.late_index()])
+        .same(
+            [Stage::Read, Stage::Issue]
+                .into_iter()
+                .flat_map(|stage| [plan.writes_at(stage), plan.early_at(stage), plan.dest_at(stage)]),
+        )
+        .same([plan.result(), plan.was_result()])
+        .port("input_write", net::INPUT1)
+        .port("input_write_place", net::INPUT1_PLACE)
+        .port("input_now", net::INPUT1_NOW)
+        .port("input_write_index", plan.input1_index())
+        .port("input_write_value", net::INPUT1_VALUE)
+        .port("input_next_value", net::INPUT2_VALUE)
+        .port("r_constant", constant)
+        .port("i_reads_status", reads_status)
+        .port("i_status", status)
+        .port("r_waits", slot.source_waits(Stage::Read, operand))
+        .port("i_waits", slot.source_waits(Stage::Issue, operand))
+        .port("operand", slot.operand(operand));
+    if plan.ecc {
+        m.wires([slot.source_wrong(operand)]);
+    }
+    m.instance(if plan.ecc {
+        let source = source
+            .parameter("ECC", 1)
+            .same([net::SCRUBS])
+            .port("scrub_index", plan.scrub_address().low(plan.index));
+        let repairs = (number as usize) < ecc::REPAIRING;
+        let source =
+            if repairs { source.port("copies", slot.copies(operand)) } else { source.open(["copies"]) };
+        source.port("sound", slot.sound(operand)).port("wrong", slot.source_wrong(operand))
+    } else {
+        let nothing = source.port("scrubs", no()).port("scrub_index", decimal(plan.index, 0_u32));
+        nothing.open(["copies", "sound", "wrong"])
+    });
 }
 
 /// Stall signals of all sources, for the bundle in a stage.

@@ -124,6 +124,10 @@ pub(crate) fn pair(plan: &Plan, latched: u16, delay: u32) -> Result<String, Modu
     let listed = later(&plan.retire_address());
     m.comment("The address of a writeback is that of a bundle whose issue is compared.");
     m.unused(Net::bit("unused"), listed, None);
+    if plan.ecc {
+        m.comment("A word may be corrected in one core alone.");
+        m.unused(Net::bit("unused_corrections"), later(&net::CORRECTIONS), None);
+    }
     m.finish()
 }
 
@@ -154,6 +158,7 @@ fn compared(plan: &Plan, of: &dyn Fn(&Net) -> Net, known: &Net) -> Vec<(u32, Exp
         net::STATUS,
     ];
     all.extend(signals.map(alone));
+    all.extend(plan.ecc.then(|| alone(net::UPSET)));
     all.extend([net::FAULT_KIND, net::FAULT_SLOT, net::FAULT_ADDRESS].map(|net| under(&net::FAULT, net)));
     all.push(under(&net::ISSUED, net::ISSUED_ADDRESS));
     all.extend([net::STORED_ADDRESS, net::STORED_VALUE].map(|net| under(&net::STORED, net)));

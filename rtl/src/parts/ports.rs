@@ -80,6 +80,14 @@ pub(super) fn ports(plan: &Plan) -> Vec<Port> {
     ];
     ports.extend(by_number.into_iter().chain(rest).chain(verification));
     ports.push(output(net::STATUS).remark("the sticky flags"));
+    if plan.ecc {
+        ports.push(output(net::CORRECTIONS).heading(
+            "Error correction: cycles in which a word was corrected, for a bundle or for good, since reset; at most 255.",
+        ));
+        ports.push(
+            output(net::UPSET).remark("sticky: a word that a bundle takes is wrong, or cannot be repaired"),
+        );
+    }
     ports
 }
 

@@ -6,6 +6,11 @@ use crate::plan::{Plan, SlotPlan};
 use crate::verilog::{Expr, Instance, Module, Net, concat, decimal};
 use takt_isa::Bank;
 
+/// A result is written back, not a word that the scrubber repairs.
+fn program(plan: &Plan, slot: &SlotPlan) -> Expr {
+    if plan.ecc { slot.writes() & !net::REPAIRED } else { slot.writes().into() }
+}
+
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("output and retire ports");
     m.comment(format!(
@@ -17,7 +22,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
         let bank = slot.slot.bank;
         let log = bank.depth.trailing_zeros();
         let port = slot.in_flight_index().slice(log - 1, plan.port_bits).every_bit();
-        m.assign(plan.output_write(&bank), slot.writes() & port);
+        m.assign(plan.output_write(&bank), program(plan, slot) & port);
         m.assign(plan.output_index(&bank), slot.in_flight_index().low(plan.port_bits));
         m.assign(plan.output_value(&bank), slot.result());
     }
@@ -36,7 +41,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
             .port("number", plan.read_output())
             .port("shown", net::READ_VALUE),
     );
-    m.assign(plan.retire(), plan.each(|slot| slot.writes() & !net::RST));
+    m.assign(plan.retire(), plan.each(|slot| program(plan, slot) & !net::RST));
     m.assign(plan.retire_address(), plan.each(SlotPlan::retire_address));
     let register = |slot: &SlotPlan| {
         let index = concat([slot.in_flight_index().low(plan.index), decimal(10 - plan.index, 0_u32)]);

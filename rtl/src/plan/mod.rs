@@ -221,6 +221,8 @@ pub struct Plan {
     pub control_slot: usize,
     /// Slots of the data memory's ports: first the slot that stores, then possibly another slot that only loads.
     pub memory_slots: Vec<usize>,
+    /// Memories have codes that detect and correct errors (docs/safety.md).
+    pub ecc: bool,
 }
 
 /// Cycles for which reset must be held to empty every pipeline.
@@ -299,6 +301,7 @@ impl Plan {
             slots,
             control_slot,
             memory_slots,
+            ecc: false,
         })
     }
 

@@ -157,6 +157,26 @@ impl Plan {
         Net::bus("load_result", 32 * self.ports())
     }
 
+    /// For each port of the data memory, the word has one wrong bit.
+    pub fn data_one_wrong(&self) -> Net {
+        Net::bus("data_one_wrong", self.ports())
+    }
+
+    /// For each port of the data memory, the word has two wrong bits.
+    pub fn data_two_wrong(&self) -> Net {
+        Net::bus("data_two_wrong", self.ports())
+    }
+
+    /// Address at which the scrubber reads all memories: as wide as that of the largest.
+    pub fn scrub_address(&self) -> Net {
+        Net::bus("scrub_address", self.code_bits.max(self.data_bits).max(self.index))
+    }
+
+    /// One-hot, the memory whose word is repaired: programs, data, banks.
+    pub fn repair(&self) -> Net {
+        Net::bus("repair", 2 * self.slot_count() + 1)
+    }
+
     /// Address of a store, two cycles after issue.
     pub fn memory_address(&self) -> Net {
         Net::bus("memory_address", self.data_bits)
@@ -271,6 +291,31 @@ impl SlotPlan {
     /// Position of a control bit.
     pub fn parameter(&self, bit: ControlBit) -> Net {
         Net::named(format!("{}_{bit}", self.name()).to_uppercase())
+    }
+
+    /// The word in the decode stage had one wrong bit.
+    pub fn word_one_wrong(&self) -> Net {
+        self.staged(Stage::Decode, "one_wrong")
+    }
+
+    /// The word in the decode stage has two wrong bits.
+    pub fn word_two_wrong(&self) -> Net {
+        self.staged(Stage::Decode, "two_wrong")
+    }
+
+    /// Corrected word of the program memory, as the scrubber has read it.
+    pub fn scrubbed(&self) -> Net {
+        self.own("scrubbed").wide(48)
+    }
+
+    /// The scrubber's word of the program memory has one wrong bit.
+    pub fn scrub_one_wrong(&self) -> Net {
+        self.own("scrub_one_wrong")
+    }
+
+    /// The scrubber's word of the program memory has two wrong bits.
+    pub fn scrub_two_wrong(&self) -> Net {
+        self.own("scrub_two_wrong")
     }
 
     /// Control bits of the slot's operation.
@@ -424,6 +469,21 @@ impl SlotPlan {
     /// A source stalls the bundle (rule 2).
     pub fn source_waits(&self, stage: Stage, operand: usize) -> Net {
         Net::named(format!("{}_{stage}_waits", self.source(operand)))
+    }
+
+    /// Words of a source's copies of the slots' banks.
+    pub fn copies(&self, operand: usize) -> Net {
+        Net::named(format!("{}_copies", self.source(operand))).wide(32 * self.slot_count)
+    }
+
+    /// For each of a source's copies, the parities of the word are right.
+    pub fn sound(&self, operand: usize) -> Net {
+        Net::named(format!("{}_sound", self.source(operand))).wide(self.slot_count)
+    }
+
+    /// The operand has had a wrong parity.
+    pub fn source_wrong(&self, operand: usize) -> Net {
+        Net::named(format!("{}_wrong", self.source(operand)))
     }
 
     /// Instance that detects hazards of the destination.

@@ -21,7 +21,6 @@ pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, Vec<Net>) {
 
 /// Outputs of a core that only a board uses.
 fn board_outputs(plan: &SystemPlan, own: &Plan) -> Vec<Net> {
-    let differs = plan.second.map(|_| net::DIFFERS);
     let outputs = [
         net::READ_VALUE,
         net::TICK_MISSED,
@@ -36,7 +35,7 @@ fn board_outputs(plan: &SystemPlan, own: &Plan) -> Vec<Net> {
         own.retire_register(),
         own.retire_value(),
     ];
-    outputs.into_iter().chain(differs).collect()
+    outputs.into_iter().chain(plan.safety.ports()).collect()
 }
 
 /// For each mailbox, a value arrives.
@@ -230,7 +229,7 @@ fn write_core(
     }
     let [write, index, value, read] = pins.map(|(_, value)| value);
     m.instance(
-        Instance::new(if plan.second.is_some() { own.pair() } else { own.top() }, "core")
+        Instance::new(if plan.safety.second_core.is_some() { own.pair() } else { own.top() }, "core")
             .parameter("LATCHED", known.program.latched_inputs().into())
             .same([
                 net::CLK,

@@ -14,7 +14,7 @@ mod top;
 pub use plan::{Driver, Pin, PinKind, SystemPlan};
 
 use crate::circuit::Library;
-use crate::export::{Design, DesignFile, ExportError, export, family_files};
+use crate::export::{Design, DesignFile, ExportError, Safety, export, family_files};
 use crate::files::SYSTEM;
 use crate::verilog::ModuleError;
 use takt_isa::load::LoadRecord;
@@ -84,11 +84,11 @@ pub fn export_system(
     name: &str,
     library: &Library,
 ) -> Result<SystemDesign, SystemError> {
-    export_driven(description, name, library, Driver::Itself, None)
+    export_driven(description, name, library, Driver::Itself, Safety::default())
 }
 
-/// Generates the circuit of a system whose loader and ticks are in the top, as in [`export_system`], or outside; `second`: cycles by which
-/// a second core beside each one is later.
+/// Generates the circuit of a system whose loader and ticks are in the top, as in [`export_system`], or outside.
+/// Every core has the mechanisms of `safety`.
 ///
 /// # Errors
 /// See [`export_system`].
@@ -97,7 +97,7 @@ pub fn export_driven(
     name: &str,
     library: &Library,
     driver: Driver,
-    second: Option<u32>,
+    safety: Safety,
 ) -> Result<SystemDesign, SystemError> {
     let mut designs: Vec<Design> = Vec::new();
     let mut cores = Vec::new();
@@ -106,12 +106,8 @@ pub fn export_driven(
         let design = match designs.iter().find(|design| design.machine == machine) {
             Some(design) => design,
             None => {
-                let design = export(machine, library);
-                let design = match second {
-                    Some(delay) => design.and_then(|design| design.paired(delay)),
-                    None => design,
-                };
-                let design = design
+                let design = export(machine, library)
+                    .and_then(|design| design.with(safety))
                     .map_err(|error| SystemError::Core { core: core.name.clone(), error: Box::new(error) })?;
                 designs.push(design);
                 &designs[designs.len() - 1]
@@ -119,7 +115,7 @@ pub fn export_driven(
         };
         cores.push(design.plan.clone());
     }
-    let plan = SystemPlan { second, ..SystemPlan::new(description.clone(), cores, name, driver) };
+    let plan = SystemPlan { safety, ..SystemPlan::new(description.clone(), cores, name, driver) };
     let records = image::records(&plan.description, &plan.mailboxes);
     let image = image::file(&plan, &records, records.len());
     let mut files = vec![DesignFile { name: format!("{}.v", plan.top), text: top::module(&plan, &records)? }];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Names in the generated part of a system, and the top's pins.
 
+use crate::export::Safety;
 use crate::plan::Plan;
 use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Net, no};
@@ -44,8 +45,8 @@ pub enum Driver {
 pub struct SystemPlan {
     /// Source of loading and ticks.
     pub driver: Driver,
-    /// Cycles by which a second core beside each one is later; `None` without second cores.
-    pub second: Option<u32>,
+    /// Mechanisms of every core.
+    pub safety: Safety,
     /// Cores and links of the system.
     pub description: Description,
     /// Plan of each core, in order.
@@ -96,7 +97,7 @@ impl SystemPlan {
         let mailboxes = (0..cores.len()).map(|core| description.mailboxes(core)).collect();
         SystemPlan {
             driver,
-            second: None,
+            safety: Safety::default(),
             description,
             cores,
             top: format!("takt_system_{plain}"),

@@ -16,7 +16,7 @@ use std::path::Path;
 use takt_family::{Family, Mapping, Part, Place, Resources, Synthesis};
 use takt_isa::Machine;
 use takt_rtl::export::{export, on_family, synthesis_top};
-use takt_rtl::{ExportError, Library, wishbone};
+use takt_rtl::{ExportError, Library, Safety, wishbone};
 use thiserror::Error;
 
 /// The clock that place and route strives for, in MHz: more than any design reaches.
@@ -101,7 +101,7 @@ pub fn packages(family: &'static Family) -> Result<[&'static str; 2], PlaceError
 }
 
 /// Core of a machine with its memories, as `takt rtl` writes it, with the family's own modules and the bus slave on a few pins, but
-/// without the parts that serve verification only; `second`: cycles by which a second core beside it is later.
+/// without the parts that serve verification only.
 ///
 /// # Errors
 /// If it has no circuit.
@@ -109,13 +109,9 @@ pub fn core(
     machine: &'static Machine,
     library: &Library,
     family: &Family,
-    second: Option<u32>,
+    safety: Safety,
 ) -> Result<Core, PlaceError> {
-    let core = export(machine, library)?;
-    let core = match second {
-        Some(delay) => core.paired(delay)?,
-        None => core,
-    };
+    let core = export(machine, library)?.with(safety)?;
     let mut files = BTreeMap::new();
     for file in on_family(&core.files, family) {
         files.insert(file.base().to_owned(), file.text);
@@ -130,7 +126,7 @@ pub fn core(
 /// # Errors
 /// If the machine has no circuit, or the family no tools.
 pub fn key(machine: &'static Machine, family: &'static Family) -> Result<String, PlaceError> {
-    let Core { files, top } = core(machine, &Library::builtin(), family, None)?;
+    let Core { files, top } = core(machine, &Library::builtin(), family, Safety::default())?;
     let tools = Tools::of(family)?;
     let commands = (tools.synthesis.commands)(&top, NETLIST, Mapping::of(machine));
     let mut hasher = DefaultHasher::new();
@@ -224,7 +220,7 @@ pub fn prepare(
     family: &'static Family,
 ) -> Result<(), PlaceError> {
     let tools = Tools::of(family)?;
-    let Core { mut files, top } = core(machine, &Library::builtin(), family, None)?;
+    let Core { mut files, top } = core(machine, &Library::builtin(), family, Safety::default())?;
     let (pins, text) = tools.place.measured.pins;
     files.insert(pins.to_owned(), text.to_owned());
     let commands = (tools.synthesis.commands)(&top, NETLIST, Mapping::of(machine));

@@ -6,7 +6,7 @@ use crate::application::Application;
 use takt_isa::Program;
 use takt_rtl::export::DesignFile;
 use takt_rtl::system::SystemPlan;
-use takt_rtl::{Driver, Library, SystemDesign, export, export_driven};
+use takt_rtl::{Driver, Library, Safety, SystemDesign, export, export_driven};
 use takt_system::Description;
 
 /// The cores, with their links.
@@ -21,37 +21,32 @@ pub(super) struct Design {
 }
 
 impl Design {
-    /// The design of an application; `second`: cycles by which second cores are later.
+    /// The design of an application, whose cores have the mechanisms of `safety`.
     pub(super) fn of(
         application: &Application<'_>,
         library: &Library,
-        second: Option<u32>,
+        safety: Safety,
     ) -> Result<Design, TopError> {
         if application.is_program() {
             let program = &application.description().cores[0].program;
-            let design = export(program.machine, library)?.latching(program.latched_inputs())?;
-            let takt_rtl::Design { files, top, .. } = match second {
-                Some(delay) => design.paired(delay)?,
-                None => design,
-            };
+            let design = export(program.machine, library)?.with(safety)?;
+            let takt_rtl::Design { files, top, .. } = design.latching(program.latched_inputs())?;
             return Ok(Design { files, top, number: number_of_program(program), plan: None });
         }
-        // A host loads the same images, with second cores and without.
-        let alone = system(application.description(), library, None)?;
+        // A host loads the same images, with the mechanisms and without.
+        let alone = system(application.description(), library, Safety::default())?;
         let number = number_of_system(&alone);
-        let design =
-            if second.is_some() { system(application.description(), library, second)? } else { alone };
+        let design = match safety == Safety::default() {
+            true => alone,
+            false => system(application.description(), library, safety)?,
+        };
         let SystemDesign { files, top, plan, .. } = design;
         Ok(Design { files, top, number, plan: Some(plan) })
     }
 }
 
-fn system(
-    description: &Description,
-    library: &Library,
-    second: Option<u32>,
-) -> Result<SystemDesign, TopError> {
-    let mut design = export_driven(description, "board", library, Driver::Board, second)?;
+fn system(description: &Description, library: &Library, safety: Safety) -> Result<SystemDesign, TopError> {
+    let mut design = export_driven(description, "board", library, Driver::Board, safety)?;
     // The board has its own modules for loading and ticks.
     let others = ["takt_loader.v", "takt_start.v", "takt_pace.v"];
     design.files.retain(|file| !others.iter().any(|name| file.name.ends_with(name)));
@@ -67,7 +62,7 @@ pub fn circuit_number<'a>(application: impl Into<Application<'a>>) -> Result<u32
     let description = application.description();
     match application.is_program() {
         true => Ok(number_of_program(&description.cores[0].program)),
-        false => Ok(number_of_system(&system(description, &Library::builtin(), None)?)),
+        false => Ok(number_of_system(&system(description, &Library::builtin(), Safety::default())?)),
     }
 }
 

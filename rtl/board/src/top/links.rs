@@ -161,8 +161,14 @@ impl Section<'_> {
                 ("tick_lost", format!("tick_lost[{k}]")),
                 ("status", format!("flags{k}")),
             ];
-            let differs = self.wiring.second_core.map(|_| ("differs", format!("differs{k}")));
-            for (port, net) in own.into_iter().chain(differs) {
+            let safety = self
+                .wiring
+                .safety
+                .ports()
+                .into_iter()
+                .map(|net| (net.name().to_owned(), format!("{}{k}", net.name())));
+            let own = own.into_iter().map(|(port, net)| (port.to_owned(), net));
+            for (port, net) in own.chain(safety) {
                 let _ = writeln!(text, "        .board{k}_{port}({net}),");
             }
             text += &Shadow::of(self.connected.application, k, self.wiring).pins(&format!("board{k}_"));

@@ -45,10 +45,11 @@ pub(super) fn check(
     for machine in machines() {
         // The export reports machines without a circuit.
         let Ok(plan) = Plan::new(machine, library) else { return Ok(None) };
+        let plan = Plan { ecc: wiring.safety.ecc, ..plan };
         cores += memories::block_rams(&plan, library, block);
     }
     // A second core has memories of its own.
-    let times = 1 + u64::from(wiring.second_core.is_some());
+    let times = 1 + u64::from(wiring.safety.second_core.is_some());
     cores *= times;
     let count = application.description().cores.len();
     let observers =

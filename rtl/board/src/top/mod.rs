@@ -65,7 +65,7 @@ pub fn circuit<'a>(
     let contents = contents(wiring, &application)?;
     let left = memory::check(board, wiring, &application, &contents, &library)?;
     let scope = ScopeSize::of(board, wiring, &application, left)?;
-    let mut design = Design::of(&application, &library, wiring.second_core)?;
+    let mut design = Design::of(&application, &library, wiring.safety)?;
     let around = wrapper::wrapper(wiring, &application, &design, (&contents, scope), &library);
     let mut files = std::mem::take(&mut design.files);
     let mut put = |name: &str, text: String| {

@@ -45,7 +45,7 @@ pub(super) fn section(
     vec![
         ("CONNECTIONS", include_str!("ports.v.in").to_owned()),
         ("CORE", core.to_owned()),
-        ("DIFFERS", if wiring.second_core.is_some() { ", .differs(differs0)" } else { "" }.to_owned()),
+        ("SAFETY", wiring.safety.connections("0")),
         ("WRITABLE", writable),
         (
             "PORT_WRITABLE",

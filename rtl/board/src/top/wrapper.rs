@@ -259,16 +259,16 @@ fn part(wiring: &Wiring, application: &Application<'_>, k: usize) -> String {
     let last = core.program.machine.inputs.depth.trailing_zeros() - 1;
     let title = if application.is_program() { String::new() } else { format!("    // {}\n", core.name) };
     let tripped = trips(wiring).map_or_else(|| "1'b0".to_owned(), |trips| format!("|{trips}"));
-    // The port of the pair, behind the core's other ones.
-    let differs = if wiring.second_core.is_some() { "" } else { " = 1'b0" };
+    // The ports of the mechanisms, behind the core's other ones; 0 without them.
+    let safety = wiring.safety.nets(&k.to_string());
     format!(
         "{title}    wire [31:0] misses{k}, periods{k}, cycles{k}, most_cycles{k}, read{k}, in_value{k};
-    wire [7:0]  cause{k};
-    wire        differs{k}{differs};
+    wire [8:0]  cause{k};
+    {safety}
     wire [2:0]  flags{k};
     wire        in_write{k};
     wire [{last}:0] in_index{k};
-    wire [31:0] status{k} = {{12'd0, cause{k}[7], {tripped}, cause{k}[5:0], drive, core_rst, flags{k}, fault_slot[{} +: 3], 1'b0, fault[{k}], halted[{k}], waiting[{k}]}};
+    wire [31:0] status{k} = {{corrections{k}, 3'd0, cause{k}[8:7], {tripped}, cause{k}[5:0], drive, core_rst, flags{k}, fault_slot[{} +: 3], 1'b0, fault[{k}], halted[{k}], waiting[{k}]}};
     reg  [31:0] seen{k} [0:{}];
     reg  [31:0] seen_there{k};
     always @(posedge clk) begin
@@ -277,7 +277,7 @@ fn part(wiring: &Wiring, application: &Application<'_>, k: usize) -> String {
     end
     takt_interlock #(.DEADLINES({}), .HOST({})) interlock{k} (
         .clk(clk), .rst(core_rst), .enable(enable), .fault(fault[{k}]), .halted(halted[{k}]), .missed(late[{k}]), .done(puts[{k}]),
-        .ticks(begins), .heard(heard), .stop(stop), .nan(nans[{k}]), .differs(differs{k}), .drive(drives[{k}]), .cause(cause{k}), .misses(misses{k})
+        .ticks(begins), .heard(heard), .stop(stop), .nan(nans[{k}]), .differs(differs{k}), .upset(upset{k}), .drive(drives[{k}]), .cause(cause{k}), .misses(misses{k})
     );
 {}",
         3 * k,

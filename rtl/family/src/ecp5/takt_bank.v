@@ -5,23 +5,26 @@
 // Same contract as ../core/takt_bank.v.
 
 module takt_bank #(
-    parameter INDEX = 8  // bits of an index
+    parameter INDEX = 8,  // bits of an index
+    parameter WIDTH = 32  // at most 36
 ) (
     input  wire             clk,
     input  wire             write,
     input  wire [INDEX-1:0] write_index,
-    input  wire [31:0]      write_value,
+    input  wire [WIDTH-1:0] write_value,
     input  wire [INDEX-1:0] read_index,
-    output wire [31:0]      value
+    output wire [WIDTH-1:0] value
 );
 
     generate
         if (INDEX <= 9) begin : g_block
             wire [8:0]  to   = {{9 - INDEX{1'b0}}, write_index};
             wire [8:0]  from = {{9 - INDEX{1'b0}}, read_index};
-            wire [35:0] in   = {4'd0, write_value};
+            wire [35:0] in;
             wire [35:0] out;
-            assign value = out[31:0];
+            assign value = out[WIDTH-1:0];
+            assign in[WIDTH-1:0] = write_value;
+            if (WIDTH < 36) assign in[35:WIDTH] = 0;
 
             // 36 bits wide, port A writes and port B reads; the upper half of a word goes in through port B's inputs and comes
             // out of port B's outputs.
@@ -50,11 +53,11 @@ module takt_bank #(
                 .DOB6(out[24]), .DOB7(out[25]), .DOB8(out[26]), .DOB9(out[27]), .DOB10(out[28]), .DOB11(out[29]),
                 .DOB12(out[30]), .DOB13(out[31]), .DOB14(out[32]), .DOB15(out[33]), .DOB16(out[34]), .DOB17(out[35])
             );
-            wire unused = &{1'b0, out[35:32]};
+            wire unused = &{1'b0, out};
         end else begin : g_blocks
             (* no_rw_check *)
-            reg [31:0] words [0:(1<<INDEX)-1];
-            reg [31:0] read, late;
+            reg [WIDTH-1:0] words [0:(1<<INDEX)-1];
+            reg [WIDTH-1:0] read, late;
             always @(posedge clk) begin
                 if (write) words[write_index] <= write_value;
                 read <= words[read_index];

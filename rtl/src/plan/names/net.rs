@@ -26,6 +26,10 @@ nets! {
     CLK "clk";
     /// Synchronous reset, active high.
     RST "rst";
+    /// Words with one wrong bit that were corrected since reset, at most 255.
+    CORRECTIONS "corrections" 8;
+    /// Sticky: a word was wrong and could not be corrected.
+    UPSET "upset";
     /// The loader writes a word.
     LOAD "load";
     /// Memory that the loader writes.
@@ -98,6 +102,32 @@ nets! {
     LOAD_REGISTER "load_register";
     /// The loader's value for a register, on the buses.
     LOADED_VALUE "loaded_value" 32;
+
+    // ---- error correction
+    /// The scrubber reads the memories.
+    SCRUBS "scrubs";
+    /// The loader's registers take a repaired word.
+    REPAIRS "repairs";
+    /// Memory of the repaired word, as [`LOAD_SPACE`].
+    REPAIR_SPACE "repair_space" 2;
+    /// Slot of the repaired word.
+    REPAIR_SLOT "repair_slot" 3;
+    /// Address of the repaired word.
+    REPAIR_ADDRESS "repair_address" 16;
+    /// The repaired word.
+    REPAIR_VALUE "repair_value" 48;
+    /// The loader wrote a repaired word in the last cycle.
+    REPAIRED "repaired";
+    /// A word with one wrong bit is corrected.
+    CORRECTED "corrected";
+    /// A word cannot be corrected.
+    WRONG "wrong";
+    /// A word of the scrubber could not be repaired.
+    SCRUB_FAILED "scrub_failed";
+    /// Corrected word of the data memory's first port.
+    DATA_CORRECTED "data_corrected" 32;
+    /// The data memory writes.
+    DATA_WRITES "data_writes";
     /// An input port is written; registered.
     INPUT1 "input1";
     /// Value written to the input port; registered.

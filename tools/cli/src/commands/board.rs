@@ -344,7 +344,7 @@ fn cells_text(board: &Board, wiring: &Wiring, carried: &application::Application
     let cores = carried.programs().iter().map(|loaded| estimator.estimate(loaded.program.machine));
     let cores = cores.collect::<Result<Vec<_>, _>>()?;
     // A second core beside each is another one of the same; what compares the two is small beside them.
-    let times = 1 + u32::from(wiring.second_core.is_some());
+    let times = 1 + u32::from(wiring.safety.second_core.is_some());
     let luts = f64::from(times) * cores.iter().map(|core| core.luts).sum::<f64>();
     let block_rams = u64::from(times) * cores.iter().map(|core| core.block_rams).sum::<u64>();
     let multipliers = u64::from(times) * cores.iter().map(|core| core.multipliers).sum::<u64>();

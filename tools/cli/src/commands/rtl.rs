@@ -15,7 +15,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_isa::MACHINES;
 use takt_isa::manual::memories_text;
-use takt_rtl::{Library, bench, export};
+use takt_rtl::{Library, Safety, bench, export};
 
 /// Write the circuit of a machine, or of a system: a complete Verilog design.
 ///
@@ -52,6 +52,10 @@ pub(crate) struct Rtl {
     #[arg(long, value_name = "CYCLES", num_args = 0..=1, default_missing_value = "2", conflicts_with = "system",
         value_parser = clap::value_parser!(u32).range(1..=16))]
     second_core: Option<u32>,
+    /// Correct one wrong bit of each word of program and data memory, detect wrong bytes of register banks, and repair all of them while the
+    /// program waits (docs/safety.md).
+    #[arg(long, conflicts_with = "system")]
+    ecc: bool,
     /// Print top module and written files as JSON.
     #[arg(long)]
     json: bool,
@@ -103,10 +107,7 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
     }
     let latched = program.as_ref().map_or(0, takt_isa::Program::latched_inputs);
     let design = export(machine, &Library::builtin())?.latching(latched)?;
-    let design = match arguments.second_core {
-        Some(delay) => design.paired(delay)?,
-        None => design,
-    };
+    let design = design.with(Safety { ecc: arguments.ecc, second_core: arguments.second_core })?;
     let mut written = Vec::new();
     for file in bench::folder(&design, program.as_ref(), &periods) {
         write(&arguments.output, &file.name, &file.text)?;
@@ -116,7 +117,7 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
         return files::json(&json!({ "machine": machine.name, "top": design.top, "files": written }), out);
     }
     let folder = arguments.output.display();
-    let what = if design.second.is_some() { "pair of cores" } else { "core" };
+    let what = if arguments.second_core.is_some() { "pair of cores" } else { "core" };
     writeln!(out, "{} files in {folder}; the {what} is {}.v", written.len(), design.top)?;
     writeln!(out, "memories: {}", memories_text(machine))?;
     Ok(())

@@ -10,7 +10,7 @@ use takt_automation::command::root;
 use takt_board::place;
 use takt_family::{Family, Mapping, Resources};
 use takt_isa::{Machine, UNITS, Unit};
-use takt_rtl::{Circuit, Library, wishbone};
+use takt_rtl::{Circuit, Library, Safety, wishbone};
 
 /// Designs selected by the arguments.
 pub(super) fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
@@ -30,7 +30,13 @@ pub(super) fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
         let machine = takt_asm::machine(&arguments.machine).map_err(anyhow::Error::msg)?;
         let file = Path::new(&arguments.machine);
         let own = if file.is_file() { system::own_path(file)? } else { None };
-        return Ok(vec![core(machine, own, &library, family, arguments.second_core)?]);
+        return Ok(vec![core(
+            machine,
+            own,
+            &library,
+            family,
+            Safety { ecc: arguments.ecc, second_core: arguments.second_core },
+        )?]);
     }
     let all = |unit: &&Unit| library.text(&format!("{}.v", unit.name)).is_some();
     let offered: Vec<&Unit> = UNITS.iter().filter(all).collect();
@@ -53,14 +59,17 @@ fn core(
     own: Option<String>,
     library: &Library,
     family: &Family,
-    second: Option<u32>,
+    safety: Safety,
 ) -> Result<Design> {
-    let place::Core { files, top } = place::core(machine, library, family, second)?;
+    let place::Core { files, top } = place::core(machine, library, family, safety)?;
     Ok(Design {
         // Record only machines of the table or of this repository, with their original memory sizes; others belong to their authors.
         recorded: machine == machine.row() && (machine.is_builtin() || own.is_some()),
         name: own.unwrap_or_else(|| machine.name.to_owned())
-            + &second.map_or_else(String::new, |delay| format!(" and a second core, {delay} cycles later")),
+            + if safety.ecc { " with error correction" } else { "" }
+            + &safety
+                .second_core
+                .map_or_else(String::new, |delay| format!(" and a second core, {delay} cycles later")),
         files,
         top,
         mapping: Mapping::of(machine),

@@ -39,6 +39,9 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "CYCLES", num_args = 0..=1, default_missing_value = "2", conflicts_with_all = ["system", "unit"],
         value_parser = clap::value_parser!(u32).range(1..=16))]
     second_core: Option<u32>,
+    /// Error correction of the machine's memories.
+    #[arg(long, conflicts_with_all = ["system", "unit"])]
+    ecc: bool,
     /// A system of several cores instead, with its programs; recorded if it is one of this repository's.
     #[arg(long, value_name = "SYSTEM.toml", conflicts_with_all = ["machine", "unit"])]
     system: Option<PathBuf>,
