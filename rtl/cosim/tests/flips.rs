@@ -325,6 +325,7 @@ fn wrong_words_are_corrected_or_told() {
         |name: &str, usual| std::env::var(name).map_or(usual, |text| text.parse::<u64>().expect("a number"));
     let (first, flips) = (number("TAKT_SEED", 0), number("TAKT_FLIPS", 300));
     let model = build(&ecc::design(&T1, 0, None));
+    let mut totals = [("flips", 0), ("corrected", 0), ("told", 0), ("harmful", 0)];
     for mut case in cases() {
         // The scrubber reads all memories in a wait of 2048 words, nine cycles each.
         if case.name == "blink" {
@@ -333,6 +334,7 @@ fn wrong_words_are_corrected_or_told() {
         }
         for (bits, name) in [(1, "one"), (2, "two")] {
             let counts = run_coded(&case, &model, first, flips, bits);
+            totals.iter_mut().for_each(|(of, total)| *total += sum(&counts, of));
             for (structure, own) in &counts {
                 let words =
                     own.iter().map(|(of, count)| format!("{}.{name}.{structure}.{of}={count}", case.name));
@@ -346,4 +348,6 @@ fn wrong_words_are_corrected_or_told() {
             }
         }
     }
+    let totals = totals.map(|(of, total)| format!("{of}={total}"));
+    println!("figures: {}", totals.join(" "));
 }

@@ -48,7 +48,9 @@ fn with_safety() -> Result<String> {
     let document = safety::DOCUMENT;
     let text =
         std::fs::read_to_string(root().join(document)).with_context(|| format!("cannot read {document}"))?;
-    between(document, &text, ("flips", "docs"), &safety::tables()?)
+    let text = between(document, &text, ("flips", "docs"), &safety::tables()?)?;
+    let text = between(document, &text, ("words", "docs"), &safety::words()?)?;
+    between(document, &text, ("cost", "docs"), &safety::cost()?)
 }
 
 /// Replaces the text between two marker comments of a document, which name the table and the command that writes it.

@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Tables of a second core: what flipped bits did, by program and by structure, as the campaign `flips` has recorded it.
+//! Tables of mechanisms against faults of the circuit: what flipped bits did, by program and by structure, as the campaigns `flips` and
+//! `words` have recorded it, and the cost.
 
 use crate::campaign::record;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use takt_rtl::synthesis::{self, Synthesis};
 
 /// Document with the tables.
 pub(crate) const DOCUMENT: &str = "docs/safety.md";
+
+/// Device and speed grade of the cost's table.
+const REFERENCE_PART: &str = "LFE5U-85F";
+const GRADE: u8 = 8;
 
 /// Standard score of a confidence interval of 95 %.
 const SCORE: f64 = 1.959_964;
@@ -125,6 +131,77 @@ pub(crate) fn tables() -> Result<String> {
         second.of("flips"),
         second.of("told")
     );
+    Ok(text)
+}
+
+/// Table of what became of flipped bits in words with codes, in Markdown.
+pub(crate) fn words() -> Result<String> {
+    let record = record::parts("words")?;
+    let mut text = String::from(
+        "| memory | wrong bits of the word | words | corrected or repaired | told, by `memory error` | harmful | of these told before a pin is wrong | not read and not reached by the scrubber |\n\
+         |---|---|---|---|---|---|---|---|\n",
+    );
+    for (name, words) in STRUCTURES.iter().filter(|(name, _)| name.starts_with("memory_")) {
+        for (bits, number) in [("one", 1), ("two", 2)] {
+            let counts = summed(&record, |_, structure| structure == format!("{bits}.{name}"));
+            if counts.of("flips") > 0 {
+                let [flips, corrected, told, harmful, early, silent, masked] = [
+                    "flips",
+                    "corrected",
+                    "told",
+                    "harmful",
+                    "harmful_told_before_a_pin",
+                    "silent",
+                    "masked",
+                ]
+                .map(|of| counts.of(of));
+                let left = silent + masked;
+                let _ = writeln!(
+                    text,
+                    "| {words} | {number} | {flips} | {corrected} | {told} | {harmful} | {early} | {left} |"
+                );
+            }
+        }
+    }
+    Ok(text)
+}
+
+/// Table of the cost of each mechanism on t1, in Markdown, from `rtl/synthesis.json`.
+pub(crate) fn cost() -> Result<String> {
+    let rows = synthesis::committed();
+    let placed = |mechanism: &str| {
+        let own = format!("t1{mechanism}");
+        let row = rows
+            .iter()
+            .find(|row| row.design == own && row.device == REFERENCE_PART && row.grade == Some(GRADE));
+        row.with_context(|| format!("{own} is not placed on the {REFERENCE_PART}"))
+    };
+    let (plain, others) =
+        (placed("")?, [placed(" with error correction")?, placed(" and a second core, 2 cycles later")?]);
+    let mut text = format!(
+        "On the {REFERENCE_PART}, speed grade {GRADE}, with one bus slave, after place and route (`cargo evidence synth --machine t1 --device \
+         {REFERENCE_PART} --grade {GRADE}`, with `--ecc`, with `--second-core`):\n\n\
+         | | t1 | with error correction | with a second core |\n|---|---|---|---|\n"
+    );
+    let carries = |row: &Synthesis| row.resources.carries.unwrap_or(0);
+    let counts: [(&str, &dyn Fn(&Synthesis) -> u64); 5] = [
+        ("LUT4", &|row| row.resources.luts - carries(row)),
+        ("LUT4 and halves of carry cells", &|row| row.resources.luts),
+        ("flip-flops", &|row| row.resources.flip_flops),
+        ("multipliers", &|row| row.resources.multipliers),
+        ("block RAMs", &|row| row.resources.block_rams),
+    ];
+    for (name, count) in counts {
+        let _ = write!(text, "| {name} | {} |", count(plain));
+        for row in others {
+            let _ = write!(text, " {} (× {:.2}) |", count(row), count(row) as f64 / count(plain) as f64);
+        }
+        text.push('\n');
+    }
+    let clock =
+        |row: &Synthesis| row.mhz.iter().map(|mhz| format!("{mhz:.1}")).collect::<Vec<_>>().join(", ");
+    let _ =
+        writeln!(text, "| MHz, by seed | {} | {} | {} |", clock(plain), clock(others[0]), clock(others[1]));
     Ok(text)
 }
 

@@ -113,6 +113,18 @@ pub(super) const CAMPAIGNS: &[Campaign] = &[
             Runs::Test("takt-cosim", "flips::harmful_flips_are_told", "TAKT_FLIPS"),
         )
     },
+    Campaign {
+        compiles: true,
+        ..Campaign::of(
+            "words",
+            "one and two bits of random words in memories with error correction flipped: they are corrected, or told before a pin is wrong",
+            "words in each of three programs, with one wrong bit and with two",
+            500,
+            8,
+            5,
+            Runs::Test("takt-cosim", "flips::wrong_words_are_corrected_or_told", "TAKT_FLIPS"),
+        )
+    },
     Campaign::of(
         "enclosures",
         "the statements of `takt accuracy` against runs that look for a contradiction",
