@@ -19,6 +19,8 @@ from circuit import FORMAL, Failure, changed, planted, read_aiger, yosys
 from solve import SOLVER, Certifier, gate, literal, remember
 from unrolled import needed
 
+# File of the planted faults that a proof has not refuted.
+LEFT = "left.json"
 # Cycles of reset. The loader is silent in them; in others the core ignores it.
 RESET = 6
 
@@ -69,14 +71,19 @@ def clauses(gates, true, some=()):
 def graph(folder, asked):
     """The core, reference, properties and invariants as gates and latches."""
     top = asked["top"]
-    script = [f"read_verilog -lib {' '.join(asked['cut'])}", f"read_verilog -sv {' '.join(asked['read'])}"]
-    script += [f"hierarchy -check -top {top}", "proc", "flatten", "memory_collect", f"memory_map {top}/sequencer.*", f"cd {top}"]
+    for file in ("bank.v", "word.v"):
+        (folder / file).write_text((FORMAL / file).read_text())
+    script = [f"read_verilog -lib {' '.join(asked['cut'])}", f"read_verilog -sv {' '.join(asked['read'])} bank.v"]
+    script += [f"hierarchy -check -top {top}", "proc", "flatten", "memory_collect", f"memory_map {top}/sequencer.*"]
+    # Of the other memories one word is left, an arbitrary one, as of the banks.
+    script += ["techmap -map word.v", f"cd {top}"]
+    script += [f"connect -nounset -set {memory}.probe {address}" for memory, address in asked["words"]]
     script += [f"connect -nounset -set {name} {path}" for name, path in asked["inner"]]
     script += ["cd ..", "cutpoint -blackbox", f"delete -port {top}/o:*"]
     script += [f"expose {top}/w:{name}" for name in ("f_bad", "f_assumed", "f_issues")]
     script += [f"expose -input {top}/w:{name}" for name in asked["constants"]]
-    # Words of the data memory are arbitrary in each cycle, and so is whatever Verilog leaves undefined: before anything is optimised.
-    script += ["opt_clean -purge", "memory -nomap", f"cutpoint {top}/t:$mem_v2 {top}/memory.* %i", "memory_map", "setundef -undriven -anyseq"]
+    # Whatever Verilog leaves undefined is arbitrary in each cycle: before anything is optimised.
+    script += ["opt_clean -purge", f"select -assert-none {top}/t:$mem*", "setundef -undriven -anyseq"]
     script += ["opt_expr", "opt_merge", "opt_clean", "dffunmap", "techmap", "opt_expr", "opt_merge", "aigmap", "opt_clean"]
     script += ["write_aiger -ascii -symbols core.aag"]
     yosys(folder, script)
@@ -130,22 +137,29 @@ def refuted(folder, asked, name, fault):
     return None
 
 
-def mutants(folder, asked, count, verbose):
-    """Plants faults in the parts of the core, and tells which are refuted; the number that are."""
+def mutants(folder, asked, count, verbose, left):
+    """Plants faults in the parts of the core, or those that another core's proof has left, and tells which are refuted; the number that
+    are."""
     faults = []
     for file in asked["read"]:
         own = [(file[:-2], fault) for fault in dict.fromkeys(planted("cosim/tests", file[:-2]))]
         text = (folder / file).read_text()
         own = [(name, fault) for name, fault in own if text.count(fault[0]) == 1]
         faults += own[:count] if count else own
-    found = 0
+    if left:
+        others = json.loads(left.read_text())
+        faults = [(name, fault) for name, fault in faults if [name, *fault] in others]
+    found = []
     for name, fault in faults:
         how = refuted(folder / "mutant", asked, name, fault)
-        found += how is not None
+        if how is not None:
+            found.append((name, fault))
         if how is None or verbose:
             print(f"{asked['machine']}: {name}: `{fault[0]}` replaced by `{fault[1]}`: {how or 'NOT refuted'}", flush=True)
-    print(f"{asked['machine']}: {found} of {len(faults)} planted faults refuted", flush=True)
-    return found, len(faults)
+    unrefuted = [[name, *fault] for name, fault in faults if (name, fault) not in found]
+    (folder / LEFT).write_text(json.dumps(unrefuted))
+    print(f"{asked['machine']}: {len(found)} of {len(faults)} planted faults refuted", flush=True)
+    return len(found), len(faults)
 
 
 def main():
@@ -153,6 +167,7 @@ def main():
     parser.add_argument("--folder", required=True)
     parser.add_argument("--certify", metavar="CHECKER", help="decide with proofs, and check each by this program's command drat")
     parser.add_argument("--mutants", type=int, help="plant faults, the first so many of each part; 0 for all")
+    parser.add_argument("--left", metavar="FOLDER", help="of these faults, plant those alone that the proof in this folder has not refuted")
     parser.add_argument("--verbose", action="store_true", help="tell how each planted fault was refuted")
     parser.add_argument("--record", action="store_true", help="write the result down")
     arguments = parser.parse_args()
@@ -172,7 +187,8 @@ def main():
             f"{solving:.0f} s of solving{certified}; {time.monotonic() - started:.0f} s",
             flush=True,
         )
-        found = mutants(folder, asked, arguments.mutants, arguments.verbose) if arguments.mutants is not None else None
+        left = Path(arguments.left) / LEFT if arguments.left else None
+        found = mutants(folder, asked, arguments.mutants, arguments.verbose, left) if arguments.mutants is not None else None
     except Failure as failure:
         sys.exit(f"error: {failure}")
     if arguments.record:

@@ -14,7 +14,7 @@ use crate::files::CORE;
 use crate::verilog::Expr;
 use std::iter;
 use takt_isa::spec::check::{MAX_CODE, MAX_DATA};
-use takt_isa::{Bank, Function, Machine, MachineError, RowPlace, Slot, SlotIndex, Unit};
+use takt_isa::{Bank, Effect, Function, Machine, MachineError, RowPlace, Slot, SlotIndex, Unit};
 use thiserror::Error;
 
 /// Reason why a machine has no circuit.
@@ -303,6 +303,15 @@ impl Plan {
             memory_slots,
             ecc: false,
         })
+    }
+
+    /// A bundle can clear the flags and be at fault: with operations of two slots.
+    pub fn clears_beside_faults(&self) -> bool {
+        let clears = self.slots.iter().filter(|slot| slot.has(ControlBit::Effect(Effect::ClearFlags)));
+        let mut others = clears.flat_map(|slot| {
+            self.memory().chain([self.control()]).filter(move |other| other.number != slot.number)
+        });
+        others.next().is_some()
     }
 
     /// Finds a slot by name.

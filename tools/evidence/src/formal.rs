@@ -96,10 +96,12 @@ pub(crate) fn inputs() -> Result<Inputs> {
         "trip.v",
         "held.v",
         "balance.py",
+        "bank.v",
         "circuit.py",
         "core.py",
         "solve.py",
         "unrolled.py",
+        "word.v",
     ]
     .map(|name| format!("rtl/formal/{name}"));
     let circuits = ["takt_pwm_phase", "takt_pwm3", "takt_trip", "takt_filter"]
@@ -141,7 +143,10 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
             verbose: arguments.verbose,
             record: arguments.certify && is_table,
         };
-        core::prove(&venv, &export(machine, &library)?, &way)?;
+        let design = export(machine, &library)?;
+        core::prove(&venv, &design, &way)?;
+        // Programs may have latched ports: the core has other gates then.
+        core::prove(&venv, &design.latching(machine.inputs.depth)?, &way)?;
     }
     if arguments.machine.is_some() {
         return Ok(());

@@ -4,6 +4,7 @@
 
 mod page;
 
+use super::core::LATCHED;
 use crate::documents::between;
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
@@ -118,13 +119,15 @@ fn cores(results: &Value) -> String {
         "| machine | properties | invariants | registers | a bundle waits for at most | s of solving | proofs checked | planted faults refuted | on |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
-    for machine in MACHINES {
-        let core = &results["core"][machine.name];
+    let names =
+        MACHINES.iter().flat_map(|machine| ["", LATCHED].map(|ports| format!("{}{ports}", machine.name)));
+    for name in names {
+        let core = &results["core"][&name];
         let [properties, invariants, registers, waits, seconds, checking, refuted, tried] =
             ["properties", "invariants", "registers", "waits", "seconds", "checking", "refuted", "tried"]
                 .map(|key| core[key].to_string());
         if core.is_null() {
-            let _ = writeln!(text, "| {} | not proved | | | | | | | |", machine.name);
+            let _ = writeln!(text, "| {name} | not proved | | | | | | | |");
             continue;
         }
         let megabytes = core["bytes"].as_f64().unwrap_or_default() / 1e6;
@@ -132,8 +135,7 @@ fn cores(results: &Value) -> String {
         let date = core["date"].as_str().unwrap_or_default();
         let _ = writeln!(
             text,
-            "| {} | {properties} | {invariants} | {registers} | {waits} cycles | {seconds} | {megabytes:.0} MB, {checking} s | {faults} | {date} |",
-            machine.name
+            "| {name} | {properties} | {invariants} | {registers} | {waits} cycles | {seconds} | {megabytes:.0} MB, {checking} s | {faults} | {date} |"
         );
     }
     text

@@ -4,10 +4,10 @@
 
 use super::decoded::{Decoded, EFFECTS};
 use super::invariants::inner;
+use super::memory::delivers;
 use super::rules::{Reference, any, booked, register};
 use std::fmt::Write as _;
 use takt_isa::Effect;
-use takt_isa::shape::Field;
 use takt_rtl::plan::names::net;
 use takt_rtl::plan::{Plan, SlotPlan, Stage};
 
@@ -18,8 +18,7 @@ pub(super) fn add(plan: &Plan, of: &mut Reference) {
         bus(plan, slot, of);
         outputs(plan, slot, of);
     }
-    memory(plan, of);
-    reports(plan, of);
+    sequencer(plan, of);
 }
 
 fn issued(slot: &SlotPlan) -> Decoded<'_> {
@@ -72,7 +71,11 @@ fn bus(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
             of.assumed.push(format!("({valid} | ({result} == 32'd0 & {raised} == 3'd0))"));
         }
     }
-    results.extend(plan.port_of(slot).map(|port| format!("{}[{} +: 32]", plan.load_result(), 32 * port)));
+    results.extend(
+        plan.port_of(slot).map(|port| {
+            format!("({{32{{{}}}}} & {}[{} +: 32])", delivers(port), plan.load_result(), 32 * port)
+        }),
+    );
     results.push(format!("({{32{{{}}}}} & {})", slot.loaded(), net::LOADED_VALUE));
     let name = slot.name();
     let always = "1'b1";
@@ -120,91 +123,12 @@ fn outputs(plan: &Plan, slot: &SlotPlan, of: &mut Reference) {
     );
 }
 
-/// Loads and stores, whose addresses are the sum of the unsigned offset and the signed register.
-fn memory(plan: &Plan, of: &mut Reference) {
-    let clk = net::CLK;
-    let field = |slot: &SlotPlan, field: Field| {
-        let bits = field.bits();
-        format!("{}[{} +: {}]", issued(slot).word(), bits.low, bits.width)
-    };
-    let mut faults = vec!["1'b0".to_owned(); plan.slots.len()];
-    for (port, slot) in plan.memory().enumerate() {
-        let (loads, stores) = (issued(slot).effect(Effect::Load), issued(slot).effect(Effect::Store));
-        let offset = format!(
-            "({stores} ? {{{}, {}}} : {})",
-            field(slot, Field::OffsetHigh),
-            field(slot, Field::OffsetLow),
-            field(slot, Field::Offset)
-        );
-        let (base, own) = (slot.operand(0), format!("f_x_port{port}"));
-        let _ = writeln!(
-            of.text,
-            "
-    reg {own}_loads, {own}_stores;
-    reg [15:0] {own}_offset;
-    wire [33:0] {own}_address = {{18'd0, {own}_offset}} + {{{{2{{{base}[31]}}}}, {base}}};
-    wire {own}_fault = ({own}_loads | {own}_stores) & ({own}_address[33] | {own}_address >= 34'd{depth});
-    always @(posedge {clk}) begin
-        {own}_loads  <= f_issues & {loads};
-        {own}_stores <= f_issues & {stores};
-        {own}_offset <= {offset};
-    end",
-            depth = plan.machine.data_depth
-        );
-        of.promise(
-            format!("port {port} of the data memory loads in the cycle after an issue, and in no other"),
-            "f_live",
-            &format!("{}[{port}]", plan.x_load()),
-            &format!("{own}_loads"),
-        );
-        let offset = format!("{}[{} +: 16]", plan.x_offset(), 16 * port);
-        of.equal(
-            "x_offset",
-            &format!("f_live & ({own}_loads | {own}_stores)"),
-            &offset,
-            &format!("{own}_offset"),
-        );
-        faults[slot.number as usize] = format!("{own}_fault");
-    }
-    faults.reverse();
-    of.promise(
-        "an address outside of the data memory is a fault, and no other is",
-        "f_live",
-        &plan.x_address_fault().to_string(),
-        &format!("{{{}}}", faults.join(", ")),
-    );
-    let value = plan.memory().next().map(|slot| slot.operand(1).to_string()).unwrap_or_default();
-    let _ = writeln!(
-        of.text,
-        "    reg f_stored;
-    reg [33:0] f_stored_address;
-    reg [31:0] f_stored_value;
-    always @(posedge {clk}) begin
-        f_stored         <= f_x_port0_stores & ~{};
-        f_stored_address <= f_x_port0_address;
-        f_stored_value   <= {value};
-    end",
-        any(faults)
-    );
-    of.equal("x_store", "f_live", &net::X_STORE.to_string(), "f_x_port0_stores");
-    of.promise(
-        "a word is stored two cycles after the issue, and in no other cycle",
-        "f_live",
-        &net::STORED.to_string(),
-        "f_stored",
-    );
-    of.promise(
-        "a word is stored at its address",
-        "f_live & f_stored",
-        &format!("{{18'd0, {}}}", net::STORED_ADDRESS),
-        "f_stored_address",
-    );
-    of.promise(
-        "a word is stored with its value",
-        "f_live & f_stored",
-        &net::STORED_VALUE.to_string(),
-        "f_stored_value",
-    );
+/// What the sequencer reports of bundles that have issued, and does with those at fault.
+fn sequencer(plan: &Plan, of: &mut Reference) {
+    reports(plan, of);
+    unreported(plan, of);
+    redirections(plan, of);
+    stops(plan, of);
 }
 
 /// Signals that report what has issued.
@@ -247,16 +171,35 @@ fn reports(plan: &Plan, of: &mut Reference) {
         let register = inner(of, "sequencer", name);
         of.equal(name, "f_live", &register, own);
     }
-    after_fault(plan, of);
+    of.equal("issued", "f_live", &net::X_ISSUED.to_string(), "f_issued1");
+    of.equal("issued", "f_live", &net::WAS_ISSUED.to_string(), "f_issued2");
+}
+
+/// The sequencer's slot stores, too.
+fn stores(plan: &Plan) -> bool {
+    plan.memory().next().is_some_and(|slot| slot.number as usize == plan.control_slot)
+}
+
+/// Bundles at fault and after a fault, of which nothing is reported.
+fn unreported(plan: &Plan, of: &mut Reference) {
     // A store in another slot than that at fault may take effect.
-    let store = plan.memory().next().is_some_and(|slot| slot.number as usize == plan.control_slot);
-    let reports = [net::ISSUED, net::ENDED, net::PUBLISHED].into_iter().chain(store.then_some(net::STORED));
+    let reports =
+        [net::ISSUED, net::ENDED, net::PUBLISHED].into_iter().chain(stores(plan).then_some(net::STORED));
     of.promise(
         "no bundle at fault is reported, stores, publishes or ends a period, and none after it",
         &format!("~{} & {}", net::RST, net::FAULT),
         &any(reports.map(|signal| signal.to_string())),
         "1'b0",
     );
+    of.never("nothing issues with an illegal bundle", &format!("~{} & f_refused & f_issued1", net::RST));
+    of.never("only what issues stores", &format!("~{} & f_x_port0_stores & ~f_issued1", net::RST));
+}
+
+/// Operations in execute that redirect, or are at fault if they end a loop. An access in the sequencer's slot is none of them.
+fn redirections(plan: &Plan, of: &mut Reference) {
+    let control = issued(plan.control());
+    let accesses =
+        plan.port_of(plan.control()).map(|port| format!("(f_x_port{port}_stores | f_x_port{port}_loads)"));
     for (name, effect) in [("x_call", Effect::Call), ("x_return", Effect::Return), ("x_loop", Effect::Loop)] {
         let (register, own) = (inner(of, "sequencer", name), format!("f_{name}"));
         let _ = writeln!(
@@ -266,12 +209,8 @@ fn reports(plan: &Plan, of: &mut Reference) {
             control.effect(effect)
         );
         of.equal(name, "f_live", &register, &own);
-        if store {
-            of.never(name, &format!("f_live & {own} & (f_x_port0_stores | f_x_port0_loads)"));
-        }
     }
-    of.never("nothing issues with an illegal bundle", &format!("~{} & f_refused & f_issued1", net::RST));
-    of.never("only what issues stores", &format!("~{} & f_x_port0_stores & ~f_issued1", net::RST));
+    let ends = of.seen("sequencer.i_ends", "");
     let nested = inner(of, "sequencer", "x_nested");
     let redirecting = EFFECTS.into_iter().filter(|effect| effect.redirects());
     let redirects = any(redirecting.map(|effect| control.effect(effect)));
@@ -281,39 +220,43 @@ fn reports(plan: &Plan, of: &mut Reference) {
         net::CLK
     );
     of.equal("x_nested", "f_live", &nested, "f_nested");
-    if store {
-        of.never("x_nested", "f_live & f_nested & (f_x_port0_stores | f_x_port0_loads)");
+    for (accesses, own) in accesses.iter().flat_map(|accesses| {
+        ["f_x_call", "f_x_return", "f_x_loop", "f_nested", "f_ended1"].map(|own| (accesses, own))
+    }) {
+        of.never("one operation of a slot", &format!("f_live & {own} & {accesses}"));
     }
-    of.equal("issued", "f_live", &net::X_ISSUED.to_string(), "f_issued1");
-    of.equal("issued", "f_live", &net::WAS_ISSUED.to_string(), "f_issued2");
 }
 
-/// Signals that stay as they are when a fault is reported.
-fn after_fault(plan: &Plan, of: &mut Reference) {
+/// Signals that say that the core stands still: as they are when a fault is reported, they stay.
+fn stops(plan: &Plan, of: &mut Reference) {
     let (clk, rst, fault) = (net::CLK, net::RST, net::FAULT);
-    let _ = writeln!(
-        of.text,
-        "
-    // Stops, as they were in the cycle before.
-    reg f_was_waiting, f_was_halted;
-    always @(posedge {clk}) begin f_was_waiting <= {}; f_was_halted <= {}; end",
-        net::WAITING,
-        net::HALTED
-    );
     let ends = of.seen("sequencer.i_ends", "");
     let _ = writeln!(
         of.text,
-        "    reg f_x_halt;\n    always @(posedge {clk}) f_x_halt <= f_issues & {} & ~{ends};",
+        "
+    // Stops, as they were in the cycle before, and a halt in execute.
+    reg f_was_waiting, f_was_halted, f_x_halt;
+    always @(posedge {clk}) begin
+        f_was_waiting <= {};
+        f_was_halted  <= {};
+        f_x_halt      <= f_issues & {} & ~{ends};
+    end",
+        net::WAITING,
+        net::HALTED,
         issued(plan.control()).effect(Effect::Halt)
     );
     let register = inner(of, "sequencer", "x_halt");
     of.equal("x_halt", "f_live", &register, "f_x_halt");
     of.never(
-        "a halt by itself",
-        "f_live & f_x_halt & (f_nested | f_x_call | f_x_return | f_x_loop | f_x_refused)",
+        "a halt or a wait by itself",
+        "f_live & (f_x_halt | f_ended1) & (f_nested | f_x_call | f_x_return | f_x_loop | f_x_refused)",
     );
-    let waits = format!("{} & ~f_was_waiting", net::WAITING);
-    of.promise("no bundle after a fault waits", &format!("~{rst} & f_over"), &waits, "1'b0");
-    let halts = format!("{} & ~f_was_halted", net::HALTED);
-    of.promise("no bundle at fault halts, and none after it", &format!("~{rst} & {fault}"), &halts, "1'b0");
+    for (what, signal) in [("waits", net::WAITING), ("halts", net::HALTED)] {
+        of.promise(
+            format!("no bundle at fault {what}, and none after it"),
+            &format!("~{rst} & {fault}"),
+            &format!("{signal} & ~f_was_{signal}"),
+            "1'b0",
+        );
+    }
 }

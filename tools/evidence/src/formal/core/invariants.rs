@@ -81,7 +81,7 @@ fn front_end(plan: &Plan, of: &mut Reference) {
     of.equal("halted", "f_live", &format!("{halt} | {}", net::HALTED), "f_halted");
     of.equal("refused", "f_live", &refused, "f_refused & ~f_refuses");
     let waiting = format!("{} | ({wait} & ~{remembered})", net::WAITING);
-    of.equal("waiting", "f_runs", &waiting, "f_waiting");
+    of.equal("waiting", "f_live", &waiting, "f_waiting");
     of.equal("remembered", "f_runs", &format!("{remembered} & ~{wait}"), "f_remembered");
     of.never(
         "a wait is under way",

@@ -9,6 +9,8 @@
 mod decoded;
 mod effects;
 mod invariants;
+mod memory;
+mod outputs;
 mod rules;
 mod sequence;
 mod values;
@@ -31,26 +33,38 @@ pub(super) struct Way {
     pub(super) record: bool,
 }
 
-/// Parts that are cut out.
-const CUT: [&str; 2] = ["takt_bank.v", "takt_program.v"];
+/// Behind the name of a machine whose core has latched ports.
+pub(super) const LATCHED: &str = ", latched ports";
 
-/// Proves that a core keeps the rules.
+/// Part that is cut out, beside the units.
+const CUT: &str = "takt_program.v";
+/// Part in whose place its contract stands, as a circuit.
+const BANK: &str = "takt_bank.v";
+
+/// Proves that a core keeps the rules. With latched ports, the planted faults are those that the proof without them has not refuted.
 ///
 /// # Errors
 /// If a tool fails, or a condition can be broken.
 pub(super) fn prove(venv: &Venv, design: &Design, way: &Way) -> Result<()> {
-    let name = design.plan.machine.name;
-    let folder = root().join("target/formal/core").join(design.plan.machine.identifier());
+    let machine = design.plan.machine;
+    let cores = root().join("target/formal/core");
+    let direct = cores.join(machine.identifier());
+    let (name, folder) = match design.latched {
+        0 => (machine.name.to_owned(), direct.clone()),
+        _ => (format!("{}{LATCHED}", machine.name), cores.join(format!("{}_latched", machine.identifier()))),
+    };
     fs::create_dir_all(&folder).with_context(|| format!("cannot write {}", folder.display()))?;
     let plan = &design.plan;
     let mut of = rules::reference(plan);
     let waits = rules::longest(plan);
-    values::add(plan, &mut of);
+    values::add(plan, design.latched > 0, &mut of);
     effects::add(plan, &mut of);
+    memory::add(plan, &mut of);
+    outputs::add(plan, design.latched > 0, &mut of);
     sequence::add(plan, &mut of);
     invariants::add(plan, &mut of);
     let (mut read, mut cut) = (Vec::new(), Vec::new());
-    for file in &design.files {
+    for file in design.files.iter().filter(|file| file.base() != BANK) {
         let mut text = file.text.clone();
         if file.base() == format!("{}.v", design.top) {
             let end = text.rfind("endmodule").context("a module ends")?;
@@ -59,14 +73,14 @@ pub(super) fn prove(venv: &Venv, design: &Design, way: &Way) -> Result<()> {
             text = format!("{}`default_nettype none\n{text}`default_nettype wire\n", of.modules);
         }
         fs::write(folder.join(file.base()), text)?;
-        let is_cut = file.name.starts_with("units/") || CUT.contains(&file.base());
+        let is_cut = file.name.starts_with("units/") || file.base() == CUT;
         let list = if is_cut { &mut cut } else { &mut read };
         list.push(file.base().to_owned());
     }
     let (bad, says): (Vec<_>, Vec<_>) = of.bad.into_iter().unzip();
     let question = serde_json::json!({
         "machine": name, "top": design.top, "refill": plan.machine.refill, "waits": waits, "cut": cut, "read": read,
-        "inner": of.inner, "constants": of.constants, "properties": of.properties, "bad": bad, "says": says,
+        "inner": of.inner, "words": of.words, "constants": of.constants, "properties": of.properties, "bad": bad, "says": says,
     });
     fs::write(folder.join("question.json"), question.to_string())?;
     let mut command = venv.command("python3")?;
@@ -77,6 +91,9 @@ pub(super) fn prove(venv: &Venv, design: &Design, way: &Way) -> Result<()> {
     }
     if let Some(mutants) = way.mutants {
         command.args(["--mutants", &mutants.to_string()]);
+        if design.latched > 0 {
+            command.arg("--left").arg(direct);
+        }
     }
     command.args(way.verbose.then_some("--verbose")).args(way.record.then_some("--record"));
     let status = command.status().context("cannot start python3")?;

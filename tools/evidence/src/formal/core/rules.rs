@@ -26,6 +26,8 @@ pub(super) struct Reference {
     pub(super) inner: Vec<(String, String)>,
     /// Nets of the text that are arbitrary, and the same in all cycles.
     pub(super) constants: Vec<String>,
+    /// Memories of which one word is kept, each with the net of its address.
+    pub(super) words: Vec<(String, String)>,
     /// Conditions that are assumed in every cycle.
     pub(super) assumed: Vec<String>,
     /// Conditions that must never hold, each with a name: violations of properties and of invariants.
@@ -43,6 +45,14 @@ impl Reference {
             self.inner.push((name.clone(), path.to_owned()));
         }
         name
+    }
+
+    /// Reduces a memory of the circuit to one word, `MEMORY.word`, at an arbitrary address that the text declares as a net.
+    pub(super) fn word(&mut self, memory: &str, address: &str) {
+        self.words.push((memory.to_owned(), address.to_owned()));
+        if self.constants.iter().all(|known| known != address) {
+            self.constants.push(address.to_owned());
+        }
     }
 
     /// Property: two values are equal where a condition holds.
