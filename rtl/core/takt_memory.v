@@ -132,7 +132,8 @@ module takt_memory #(
                 assign result[32*p +: 32] = q;
                 assign {one_wrong[p], two_wrong[p]} = 2'd0;
             end else begin : g_ecc
-                // The way from the block RAM takes half a cycle: the syndrome's place is known at its end, the word in the next one.
+                // The way from the block RAM takes half a cycle: the syndrome's place is known at its end, the word in the next one. The
+                // modules stay apart, so that synthesis, which does not count that half, gives each of them its least depth.
                 wire [6:0]  check;
                 wire [31:0] fixed;
                 wire [15:0] read_low;
@@ -142,14 +143,16 @@ module takt_memory #(
                 reg  [15:0] low;
                 reg  [7:0]  high;
                 reg         q_one_wrong, q_two_wrong;
+                (* keep_hierarchy = "yes" *)
                 takt_ecc_code #(.BITS(32)) checks (
                     .data(read), .check(check), .low(16'd0), .high(8'd0), .corrected()
                 );
+                (* keep_hierarchy = "yes" *)
                 takt_ecc_place place (
                     .syndrome(check ^ loaded[WIDTH*p+32 +: 7]), .low(read_low), .high(read_high), .one_wrong(read_one_wrong), .two_wrong(read_two_wrong)
                 );
                 always @(posedge clk) {q, low, high, q_one_wrong, q_two_wrong} <= {read, read_low, read_high, read_one_wrong, read_two_wrong};
-                takt_ecc_code #(.BITS(32)) corrects (
+                takt_ecc_code #(.BITS(32), .CORRECTS(1)) corrects (
                     .data(q), .check(), .low(low), .high(high), .corrected(fixed)
                 );
                 assign result[32*p +: 32] = fixed & {32{out_valid[p]}};

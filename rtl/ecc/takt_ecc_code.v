@@ -7,10 +7,12 @@
 //
 // Contract
 //   check: the check bits of data. Those of a word that was read, XOR the check bits that were read with it, are its syndrome.
-//   corrected: data without the wrong bit that low and high (takt_ecc_place) tell.
+//   corrected: data without the wrong bit that low and high (takt_ecc_place) tell. With CORRECTS, this is what the module has; without, it
+//   has check, and corrected is 0.
 
 module takt_ecc_code #(
-    parameter BITS = 32  // at most 56
+    parameter BITS     = 32,  // at most 56
+    parameter CORRECTS = 0
 ) (
     input  wire [BITS-1:0] data,
     output wire [6:0]      check,
@@ -42,16 +44,23 @@ module takt_ecc_code #(
 
     genvar i, k;
     generate
-        for (k = 0; k < 7; k = k + 1) begin : g_check
-            wire [BITS-1:0] taken;
-            for (i = 0; i < BITS; i = i + 1) begin : g_bit
-                assign taken[i] = data[i] & COLUMNS[7*i + k];
+        if (CORRECTS == 0) begin : g_checks
+            for (k = 0; k < 7; k = k + 1) begin : g_check
+                wire [BITS-1:0] taken;
+                for (i = 0; i < BITS; i = i + 1) begin : g_bit
+                    assign taken[i] = data[i] & COLUMNS[7*i + k];
+                end
+                assign check[k] = ^taken;
             end
-            assign check[k] = ^taken;
-        end
-        for (i = 0; i < BITS; i = i + 1) begin : g_corrected
-            localparam [6:0] COLUMN = COLUMNS[7*i +: 7];
-            assign corrected[i] = data[i] ^ (low[COLUMN[3:0]] & high[COLUMN[6:4]]);
+            assign corrected = {BITS{1'b0}};
+            wire unused = &{1'b0, low, high};
+        end else begin : g_corrects
+            for (i = 0; i < BITS; i = i + 1) begin : g_bit
+                localparam [6:0] COLUMN = COLUMNS[7*i +: 7];
+                assign corrected[i] = data[i] ^ (low[COLUMN[3:0]] & high[COLUMN[6:4]]);
+            end
+            assign check = 7'd0;
+            wire unused = &{1'b0, low, high};
         end
     endgenerate
 

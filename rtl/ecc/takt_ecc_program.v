@@ -51,7 +51,8 @@ module takt_ecc_program #(
     takt_ecc_code #(.BITS(BITS)) encodes (
         .data(stored), .check(stored_check), .low(16'd0), .high(8'd0), .corrected()
     );
-    // The way from the block RAM takes half a cycle: the word is corrected in the decode stage.
+    // The way from the block RAM takes half a cycle: the word is corrected in the decode stage. `checks` stays apart, so that synthesis,
+    // which does not count that half, gives it the least depth.
     reg  [BITS-1:0] raw;
     reg  [6:0]      syndrome;
     wire [BITS-1:0] decoded;
@@ -63,13 +64,14 @@ module takt_ecc_program #(
             syndrome <= kept_check ^ kept[BITS+6:BITS];
         end
     end
+    (* keep_hierarchy = "yes" *)
     takt_ecc_code #(.BITS(BITS)) checks (
         .data(kept[BITS-1:0]), .check(kept_check), .low(16'd0), .high(8'd0), .corrected()
     );
     takt_ecc_place place (
         .syndrome(syndrome), .low(low), .high(high), .one_wrong(one_wrong), .two_wrong(two_wrong)
     );
-    takt_ecc_code #(.BITS(BITS)) corrects (
+    takt_ecc_code #(.BITS(BITS), .CORRECTS(1)) corrects (
         .data(raw), .check(), .low(low), .high(high), .corrected(decoded)
     );
 
@@ -79,8 +81,11 @@ module takt_ecc_program #(
     takt_ecc_place scrub_place (
         .syndrome(seen_syndrome), .low(scrub_low), .high(scrub_high), .one_wrong(scrub_one_wrong), .two_wrong(scrub_two_wrong)
     );
-    takt_ecc_code #(.BITS(BITS)) repairs (
-        .data(seen[BITS-1:0]), .check(seen_check), .low(scrub_low), .high(scrub_high), .corrected(repaired)
+    takt_ecc_code #(.BITS(BITS)) scrubs (
+        .data(seen[BITS-1:0]), .check(seen_check), .low(16'd0), .high(8'd0), .corrected()
+    );
+    takt_ecc_code #(.BITS(BITS), .CORRECTS(1)) repairs (
+        .data(seen[BITS-1:0]), .check(), .low(scrub_low), .high(scrub_high), .corrected(repaired)
     );
 
     generate

@@ -7,6 +7,7 @@
 //! synthesised for both, and the clock is the same part of it as theirs.
 
 use crate::Library;
+use crate::export::Safety;
 use crate::memories::block_rams;
 use crate::plan::{Plan, PlanError};
 use crate::synthesis::{Synthesis, committed};
@@ -242,6 +243,25 @@ impl Estimator {
         })
     }
 
+    /// Estimates a machine with mechanisms against faults: error correction takes the share of cells that it takes on t1, and a second core
+    /// as much as the first one; what compares the two is small beside them. The clock is that without them.
+    ///
+    /// # Errors
+    /// If the machine has no circuit.
+    pub fn estimate_with(&self, machine: &'static Machine, safety: Safety) -> Result<Estimate, PlanError> {
+        let estimate = self.estimate(machine)?;
+        let plan = Plan { ecc: safety.ecc, ..Plan::new(machine, &self.library)? };
+        let times = 1 + u32::from(safety.second_core.is_some());
+        let cells = f64::from(times) * if safety.ecc { ecc_share() } else { 1.0 };
+        Ok(Estimate {
+            luts: cells * estimate.luts,
+            flip_flops: cells * estimate.flip_flops,
+            multipliers: u64::from(times) * estimate.multipliers,
+            block_rams: u64::from(times) * block_rams(&plan, &self.library, self.family.block_ram()),
+            ..estimate
+        })
+    }
+
     /// Compares the placed machines with their estimates on [`MEASURED`].
     pub fn calibration(&self) -> Vec<Calibration> {
         let row = |(index, placed): (usize, &PlacedMachine)| {
@@ -256,6 +276,16 @@ impl Estimator {
         };
         self.placed.iter().enumerate().map(row).collect()
     }
+}
+
+/// Cells of t1 with error correction, as a multiple of those without; 1 if it was not placed.
+fn ecc_share() -> f64 {
+    let rows = committed();
+    let luts = |design: &str| {
+        let row = rows.iter().find(|row| row.design == design && row.device == MEASURED.part);
+        row.map(|row| row.resources.luts as f64)
+    };
+    luts("t1 with error correction").zip(luts("t1")).map_or(1.0, |(with, without)| with / without)
 }
 
 /// Fits LUT4 and flip-flops besides the parts as functions of source operands, and the clock's period as a function of LUT4.

@@ -89,7 +89,7 @@ const COMMON: &[Fault] = &[
     ("takt_outputs", "order[read_at[ADDRESS-1:0]]", "order[{1'b0, read_at[ADDRESS-2:0]}]"),
     // A unit and the data memory that drive their slot's bus in other cycles, too.
     ("takt_sine", "~valid[12]", "1'b0"),
-    ("takt_memory", "read & {32{delivers}}", "read"),
+    ("takt_memory", "read & {32{delivers[p]}}", "read"),
     // Loops: the counts, the levels as of issue and as of fetch, the refill after a short body. The proof in CI refutes the first fault,
     // too.
     ("takt_loops", "x_count != 16'd1", "1'b1"),

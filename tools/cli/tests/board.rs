@@ -54,6 +54,14 @@ fn the_example_fits_its_board_and_a_circuit_is_written() {
         .ok();
     assert!(two.contains("the core and its second one take about 11"), "{two}");
     assert!(two.contains(" 42 of 208 block RAMs, 12 of 156 multipliers"), "{two}");
+    folder.write("ecc.toml", format!("ecc = true\n{wiring}"));
+    let ecc = folder
+        .line(&format!("board check --board ulx3s-85f --wiring ecc.toml --program {program} -m t1"))
+        .ok();
+    assert!(
+        ecc.contains("the core takes about 6") && ecc.contains(" 23 of 208 block RAMs, 6 of 156"),
+        "{ecc}"
+    );
     folder.line(&format!("board build --board ulx3s-85f {} --sources -o out", position())).ok();
     let pins = folder.read_text("out/pins.lpf");
     assert!(pins.contains("LOCATE COMP \"encoder_a\" SITE \"B11\";"), "{pins}");

@@ -99,6 +99,22 @@ fn latched_ports_come_from_the_program() {
     assert!(text.contains("3 periods on t1") && text.contains("no difference"), "{text}");
 }
 
+/// Mechanisms against faults of the circuit, and what they cost in block RAMs.
+#[test]
+fn a_core_has_the_mechanisms_that_are_asked_for() {
+    let folder = Folder::new();
+    let text = folder.line("rtl -m t1 --ecc -o ecc").ok();
+    assert!(text.contains("the core is takt_t1.v") && text.ends_with("are 23, without 21\n"), "{text}");
+    let core = folder.read_text("ecc/takt_t1.v");
+    assert!(core.contains("output wire        upset") && core.contains("takt_ecc_scrub"), "{core}");
+    let list = folder.read_text("ecc/takt_t1.f");
+    assert!(list.contains("ecc/takt_ecc_program.v") && !list.contains("core/takt_program.v"), "{list}");
+    folder.line("rtl -m t1 --ecc --second-core 3 -o both").ok();
+    assert!(folder.read_text("both/takt_t1_pair.v").contains("upset"));
+    let refused = folder.line("rtl system.toml --ecc -o out");
+    assert!(refused.status == Some(2) && refused.stderr.contains("--ecc"), "{refused:?}");
+}
+
 /// The repository's system with three cores on two machines.
 #[test]
 fn a_system_is_a_circuit() {

@@ -341,17 +341,16 @@ fn cells_text(board: &Board, wiring: &Wiring, carried: &application::Application
         return Ok(format!("cells: not estimated for the {}; {THEN}", board.family.text));
     };
     let estimator = Estimator::of(board.family)?;
-    let cores = carried.programs().iter().map(|loaded| estimator.estimate(loaded.program.machine));
+    let programs = carried.programs().iter();
+    let cores = programs.map(|loaded| estimator.estimate_with(loaded.program.machine, wiring.safety));
     let cores = cores.collect::<Result<Vec<_>, _>>()?;
-    // A second core beside each is another one of the same; what compares the two is small beside them.
-    let times = 1 + u32::from(wiring.safety.second_core.is_some());
-    let luts = f64::from(times) * cores.iter().map(|core| core.luts).sum::<f64>();
-    let block_rams = u64::from(times) * cores.iter().map(|core| core.block_rams).sum::<u64>();
-    let multipliers = u64::from(times) * cores.iter().map(|core| core.multipliers).sum::<u64>();
-    let cores = match (cores.len(), times) {
-        (1, 1) => "the core takes",
+    let luts = cores.iter().map(|core| core.luts).sum::<f64>();
+    let block_rams = cores.iter().map(|core| core.block_rams).sum::<u64>();
+    let multipliers = cores.iter().map(|core| core.multipliers).sum::<u64>();
+    let cores = match (cores.len(), wiring.safety.second_core) {
+        (1, None) => "the core takes",
         (1, _) => "the core and its second one take",
-        (_, 1) => "the cores take",
+        (_, None) => "the cores take",
         _ => "the cores and their second ones take",
     };
     Ok(format!(

@@ -13,9 +13,10 @@ use clap::Args;
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use takt_family::REFERENCE;
 use takt_isa::MACHINES;
 use takt_isa::manual::memories_text;
-use takt_rtl::{Library, Safety, bench, export};
+use takt_rtl::{Library, Plan, Safety, bench, export, memories};
 
 /// Write the circuit of a machine, or of a system: a complete Verilog design.
 ///
@@ -120,6 +121,12 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
     let what = if arguments.second_core.is_some() { "pair of cores" } else { "core" };
     writeln!(out, "{} files in {folder}; the {what} is {}.v", written.len(), design.top)?;
     writeln!(out, "memories: {}", memories_text(machine))?;
+    if arguments.ecc {
+        let rams = |plan: &Plan| memories::block_rams(plan, &Library::builtin(), REFERENCE.block_ram());
+        let plain = rams(&Plan { ecc: false, ..design.plan.clone() });
+        let text = "error correction: block RAMs of the whole core are";
+        writeln!(out, "{text} {}, without {plain}", rams(&design.plan))?;
+    }
     Ok(())
 }
 
