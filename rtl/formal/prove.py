@@ -62,6 +62,7 @@ class Session:
         if proof.table:
             return tables.read(folder, texts, proof.table)
         if proof.simulated:
+            folder.mkdir(parents=True, exist_ok=True)
             return {file: texts[file] for file in circuit.instantiated(texts, proof.top)}
         if proof.enumerated:
             return enumerated.function(self.unit(texts, proof), self.rows[proof.units[0]], proof.units[0], proof.enumerated)

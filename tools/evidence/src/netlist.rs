@@ -80,7 +80,8 @@ pub(crate) fn inputs() -> Result<Inputs> {
     let texts =
         [include_str!("netlist.rs"), include_str!("netlist/reading.rs"), include_str!("netlist/refusals.rs")];
     let own = (texts, YOSYS, SAT, SHARE);
-    let key = Inputs::default().and((design, core.synthesis.files, commands, equality, cells, own));
+    let tools = Inputs::default().tool("verilator", "--version");
+    let key = tools.and((design, core.synthesis.files, commands, equality, cells, own));
     [
         "rtl/formal/mapped.py",
         "rtl/formal/reading.py",
