@@ -74,6 +74,7 @@ class Graph:
     outputs: dict  # name -> literal
     ands: list  # (literal, left, right), each after those that it uses
     registers: dict = field(default_factory=dict)  # name of a register's bit -> literal
+    initial: dict = field(default_factory=dict)  # literal of a latch -> its first value, 0 or 1; others have any
 
     @property
     def key(self):
@@ -105,15 +106,20 @@ class Graph:
 
 
 def read_aiger(text):
-    """Reads AIGER's ASCII form as yosys writes it."""
+    """Reads AIGER's ASCII form as yosys writes it. Assertions become outputs bad[0] and so on, 1 where they fail, and assumptions outputs
+    assumed[0] and so on."""
     lines = text.split("\n")
-    counts = [int(count) for count in lines[0].split()[2:6]]
+    inputs, latches, outputs, ands, *more = (int(count) for count in lines[0].split()[2:])
+    bad, assumed, *others = [*more, 0, 0][: max(2, len(more))]
+    if any(others):
+        raise Failure("the graph has conditions of liveness")
+    counts = [inputs, latches, outputs, bad, assumed, ands]
     at = 1
     blocks = []
     for count in counts:
         blocks.append([[int(number) for number in line.split()] for line in lines[at : at + count]])
         at += count
-    inputs, latches, outputs, ands = blocks
+    inputs, latches, outputs, bad, assumed, ands = blocks
     names = {"i": {}, "l": {}, "o": {}}
     for line in lines[at:]:
         if line == "c":
@@ -123,6 +129,10 @@ def read_aiger(text):
             names[number[0]][int(number[1:])] = name
     named = lambda kind, rows: {names[kind].get(i, f"{kind}{i}"): row[0] for i, row in enumerate(rows)}
     graph = Graph(named("i", inputs), {row[0]: row[1] for row in latches}, named("o", outputs), [])
+    for kind, rows in (("bad", bad), ("assumed", assumed)):
+        graph.outputs |= {f"{kind}[{i}]": row[0] for i, row in enumerate(rows)}
+    # A latch begins with 0 if nothing else is stated, and with any value if it is stated to begin with its own.
+    graph.initial = {row[0]: (*row, 0)[2] for row in latches if row[0] not in row[2:]}
     # A bit may have several names.
     for i, row in enumerate(latches):
         graph.registers |= {name: row[0] for name in names["l"].get(i, "").split()}

@@ -14,10 +14,10 @@ from pathlib import Path
 
 from pysat.solvers import Solver
 
+import induction
 from balance import Unrolled
-from circuit import FORMAL, Failure, changed, planted, read_aiger, yosys
-from solve import SOLVER, Certifier, gate, literal, remember
-from unrolled import needed
+from circuit import Failure, changed, planted, read_aiger, yosys
+from solve import SOLVER, Certifier, remember
 
 # File of the planted faults that a proof has not refuted.
 LEFT = "left.json"
@@ -54,18 +54,8 @@ class Core:
     def issues(self):
         """Whether a bundle can issue as soon as the front end delivers one: if not, what is assumed cannot be."""
         gates, cycles, assumed = self.unrolled([1] * RESET + [0] * (self.asked["refill"] + 1))
-        with Solver(name=SOLVER, bootstrap_with=clauses(gates, [*assumed, cycles[-1][1]])) as solver:
+        with Solver(name=SOLVER, bootstrap_with=induction.clauses(gates, [*assumed, cycles[-1][1]])) as solver:
             return solver.solve()
-
-
-def clauses(gates, true, some=()):
-    """The clauses that say that some literals are true, and one at least of some others, if there are any."""
-    result = [[-1], *([literal(one)] for one in true)]
-    if some:
-        result.append([literal(one) for one in some])
-    for out, left, right in needed(gates.ands, [*true, *some]):
-        result += gate(out, left, right)
-    return result
 
 
 def graph(folder, asked):
@@ -90,21 +80,12 @@ def graph(folder, asked):
     return read_aiger((folder / "core.aag").read_text())
 
 
-def decided(folder, core, certifier=None):
+def decided(core, certifier=None):
     """Seconds of solving, bytes of the proofs, seconds of checking them; raises Refuted if a condition can be 1."""
-    total = [0.0, 0, 0.0]
-    for name, gates, assumed, bad in core.questions():
-        found = clauses(gates, assumed, bad)
-        certified = certifier.refute(numbered(found), name.replace(" ", "_")) if certifier else None
-        if certified is None:
-            started = time.process_time()
-            with Solver(name=SOLVER, bootstrap_with=found) as solver:
-                if solver.solve():
-                    model = set(solver.get_model())
-                    raise Refuted(core.asked, name, [number for number, one in enumerate(bad) if literal(one) in model])
-            certified = time.process_time() - started, 0, 0.0
-        total = [one + other for one, other in zip(total, certified)]
-    return total
+    try:
+        return induction.decided(core.questions(), certifier)
+    except induction.Refuted as found:
+        raise Refuted(core.asked, found.name, found.numbers) from None
 
 
 class Refuted(Failure):
@@ -117,13 +98,6 @@ class Refuted(Failure):
         super().__init__("\n".join(lines))
 
 
-def numbered(found):
-    """Clauses whose variables are numbered without gaps."""
-    numbers = {}
-    number = lambda variable: numbers.setdefault(variable, len(numbers) + 1)
-    return [[number(one) if one > 0 else -number(-one) for one in clause] for clause in found]
-
-
 def refuted(folder, asked, name, fault):
     """The first condition that a fault (old, new) in a part breaks; None if the proof holds with it."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -131,7 +105,7 @@ def refuted(folder, asked, name, fault):
     for file, text in changed(texts, [f"{name}.v"], fault).items():
         (folder / file).write_text(text)
     try:
-        decided(folder, Core(folder, asked))
+        decided(Core(folder, asked))
     except Refuted as found:
         return found.first
     return None
@@ -177,7 +151,7 @@ def main():
     try:
         core = Core(folder, asked)
         certifier = Certifier(folder, arguments.certify) if arguments.certify else None
-        solving, size, checking = decided(folder, core, certifier)
+        solving, size, checking = decided(core, certifier)
         if not core.issues():
             raise Failure(f"{machine}: no bundle can issue when the front end delivers one: that proves nothing")
         certified = f"; proofs of {size / 1e6:.0f} MB checked in {checking:.0f} s" if certifier else ""

@@ -19,6 +19,8 @@ from unrolled import needed
 ENUMERATOR = os.environ.get("TAKT_ENUMERATOR")
 # Sources of the specification, and of that program's comparison.
 COMPARED = [FORMAL.parents[1] / "isa" / "src" / "fp", FORMAL / "src"]
+# Driver of a circuit in Verilator.
+DRIVER = FORMAL.parent / "tests" / "harness"
 # Number of combinations of sign and exponent.
 CASES = 512
 
@@ -59,8 +61,6 @@ class Enumeration:
     """A function, of which no operand may have another result or other flags than in the specification."""
 
     def __init__(self, graph, operation, path):
-        if not ENUMERATOR:
-            raise Failure("the variable TAKT_ENUMERATOR does not name the program: use `cargo evidence formal --units`")
         self.operation = operation
         self.path = path
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -72,10 +72,16 @@ class Enumeration:
         texts = [path.read_bytes() for folder in COMPARED for path in sorted(folder.glob("*.rs"))]
         return hashlib.sha256(b"".join([graph.key.encode(), *texts])).hexdigest()[:16]
 
+    def evaluated(self):
+        """Arguments that name what is evaluated."""
+        return [self.path]
+
     def counterexample(self, number=None):
         """The first operand of a case, or of all, that differs, by bits; None if there is none."""
+        if not ENUMERATOR:
+            raise Failure("the variable TAKT_ENUMERATOR does not name the program: use `cargo evidence formal --units`")
         case = [] if number is None else ["--case", str(number)]
-        command = [ENUMERATOR, "enumerate", self.path, "--op", self.operation, *case]
+        command = [ENUMERATOR, "enumerate", *self.evaluated(), "--op", self.operation, *case]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise Failure(f"the enumeration of {self.operation} failed:\n{done.stderr}")
@@ -86,3 +92,19 @@ class Enumeration:
     def uncovered(self, parts):
         """None: every sign and exponent is a case."""
         assert parts == CASES
+
+
+class Simulation(Enumeration):
+    """A unit's circuit in Verilator, instead of its gates: another front end, and another evaluator."""
+
+    def __init__(self, unit, operation):
+        self.unit, self.operation = unit, operation
+
+    @staticmethod
+    def key(texts):
+        """A hash of all that the outcome depends on."""
+        compared = [path.read_bytes() for folder in (*COMPARED, DRIVER) for path in sorted(folder.iterdir())]
+        return hashlib.sha256(b"".join([repr(texts).encode(), *compared])).hexdigest()[:16]
+
+    def evaluated(self):
+        return ["--circuit", self.unit]

@@ -404,7 +404,10 @@ def differing(kind, name, bits):
 def counterexample(asked, kind, name):
     """In words, what a solution shows; None if there is none."""
     values = asked.counterexample()
-    return values and differing(kind, name, [bit for bit, value in asked.graph.evaluate(values).items() if value and bit != "bad"])
+    # Bits that always differ depend on no input.
+    if values is None:
+        return None
+    return differing(kind, name, [bit for bit, value in asked.graph.evaluate(values).items() if value and bit != "bad"])
 
 
 class Progress:
@@ -560,7 +563,11 @@ def mutants(comparison, count, what, verbose):
         while of["refuted"] < count:
             if sum(of.values()) > 10 * count:
                 raise Failure(f"of {sum(of.values())} faults in {kind}, {of['refuted']} are refuted")
-            text, faulty, matters = plant(comparison, chance)
+            try:
+                text, faulty, matters = plant(comparison, chance)
+            except IndexError:
+                # There is no place for such a fault.
+                break
             how = refuted(comparison, proved, faulty)
             if how:
                 outcome, how = "refuted", f"refuted: {how}"

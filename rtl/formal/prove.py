@@ -61,6 +61,9 @@ class Session:
         """The graph of a proof; of a table, its words."""
         if proof.table:
             return tables.read(folder, texts, proof.table)
+        if proof.simulated:
+            folder.mkdir(parents=True, exist_ok=True)
+            return {file: texts[file] for file in circuit.instantiated(texts, proof.top)}
         if proof.enumerated:
             return enumerated.function(self.unit(texts, proof), self.rows[proof.units[0]], proof.units[0], proof.enumerated)
         if not proof.iterative:
@@ -82,6 +85,8 @@ class Session:
         """A function that asks the question of a proof: the solver's, the enumerator's, or that of a table's words."""
         if proof.table:
             return functools.partial(tables.Comparison, graph)
+        if proof.simulated:
+            return functools.partial(enumerated.Simulation, proof.units[0], proof.enumerated)
         if proof.enumerated:
             return functools.partial(enumerated.Enumeration, graph, proof.enumerated, folder / "function.aag")
         return functools.partial(solve.Question, graph)
@@ -116,7 +121,8 @@ class Session:
         """Proves one row of the table; raises Failure with the operands of a counterexample."""
         folder = self.folder / proof.name
         graph = self.graph(folder, self.texts, proof)
-        key = tables.Comparison.key(graph) if proof.table else enumerated.Enumeration.key(graph) if proof.enumerated else graph.key
+        kind = tables.Comparison if proof.table else enumerated.Simulation if proof.simulated else enumerated.Enumeration if proof.enumerated else None
+        key = kind.key(graph) if kind else graph.key
         record = solve.Record(folder / "cases.json", key, self.arguments.again)
         chosen = self.arguments.cases
         started = time.monotonic()
@@ -156,7 +162,7 @@ class Session:
         """How a planted fault was found, or None."""
         unit = mutant[0]
         texts, broken = circuit.sources(self.rows, mutant), None
-        about = [proof for proof in PROOFS if unit in proof.units]
+        about = [proof for proof in PROOFS if unit in proof.units and not proof.simulated]
         # A miter with cuts may differ for values that cannot occur, so prefer exact ones.
         tabled = [proof for proof in about if proof.table]
         about = [proof for proof in about if proof.exact and not proof.table] or [proof for proof in about if not proof.table]

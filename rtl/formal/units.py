@@ -25,6 +25,7 @@ class Proof:
     held: tuple = ()  # registers that a step only reads, observed before it
     steps: range = range(0)  # cycles that are steps
     enumerated: str = ""  # instruction whose operands are enumerated (enumerated.py), instead of a miter
+    simulated: bool = False  # of an enumeration: of the unit's circuit in Verilator, instead of its gates
     table: str = ""  # table whose words are compared with the specification's (tables.py), instead of a miter
     exact: bool = True  # the miter also exists without arbitrary values
     defines: tuple = ()
@@ -189,6 +190,10 @@ PROOFS = [
     Proof("sine", ("sine",), enumerated="fsin", text="fsin, all operands, one after the other"),
     Proof("cosine", ("sine",), enumerated="fcos", text="fcos, all operands, one after the other"),
     Proof("arccosine", ("arccosine",), enumerated="facos", text="facos, all operands, one after the other"),
+    *(
+        Proof(f"{name}.circuit", (unit,), enumerated=operation, simulated=True, text=f"{operation}, operands one after the other, the circuit in Verilator")
+        for name, unit, operation in [("sine", "sine", "fsin"), ("cosine", "sine", "fcos"), ("arccosine", "arccosine", "facos")]
+    ),
 ]
 
 # Registers whose values the timing proof of a unit takes one by one (balance.py).

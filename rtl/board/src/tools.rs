@@ -102,7 +102,7 @@ impl Venv {
     /// # Errors
     /// If the tool fails, with the end of its output.
     pub fn run(&self, tool: &str, folder: &Path, arguments: &[&str]) -> Result<(), ToolError> {
-        // smtbmc looks for its solver in PATH.
+        // Tools of the environment find one another in PATH.
         let mut path = self.0.join("bin").into_os_string();
         path.push(":");
         path.push(std::env::var_os("PATH").unwrap_or_default());

@@ -122,7 +122,7 @@ const fn check(name: &'static str, command: &'static str, seconds: Option<f64>) 
 pub const CHECKS: [Check; 13] = [
     check("formal", "cargo evidence check formal", Some(158.0)),
     check("units", "cargo evidence check units", Some(100.0)),
-    check("netlist", "cargo evidence check netlist", Some(60.0)),
+    check("netlist", "cargo evidence check netlist", Some(110.0)),
     check(OPERANDS, "cargo evidence formal --units", Some(900.0)),
     check("clients", "cargo evidence check clients", None),
     check("litex", "cargo evidence check litex", None),

@@ -11,10 +11,7 @@ use takt_board::tools::{self, ToolError};
 
 pub use takt_board::tools::YOSYS;
 
-/// SMT solver of formal verification.
-pub const Z3: &str = "z3-solver==5.4.0.0";
-
-/// SAT solvers of the units' proofs.
+/// SAT solvers of formal verification.
 pub const SAT: &str = "python-sat==1.9.dev24";
 
 /// Reference packages of `takt-front`'s tests: rigid-body dynamics, robots (in URDF, and four packages in MJCF), and tools whose

@@ -15,9 +15,10 @@ pub(crate) use tables::tables;
 
 use anyhow::{Context, Result, ensure};
 use std::fs;
+use std::process::Command;
 use takt_automation::check_cache::Inputs;
 use takt_automation::command::{apt_install, root, works};
-use takt_automation::venv::{SAT, Venv, YOSYS, Z3};
+use takt_automation::venv::{SAT, Venv, YOSYS};
 use takt_diagnostics::machine;
 use takt_family::{FAMILIES, Family, Proof};
 use takt_isa::T1;
@@ -34,6 +35,9 @@ pub(crate) struct Arguments {
     /// Stopped, it goes on where it was.
     #[arg(long, num_args = 0.., value_name = "NAME", conflicts_with = "machine")]
     units: Option<Vec<String>>,
+    /// Prove half bridges and trips alone.
+    #[arg(long, conflicts_with_all = ["machine", "units"])]
+    bridges: bool,
     /// Of units: cases decided side by side.
     #[arg(long, default_value_t = 1, requires = "units")]
     jobs: usize,
@@ -50,7 +54,7 @@ pub(crate) struct Arguments {
     /// Of units: decide again what has been decided.
     #[arg(long, requires = "units")]
     again: bool,
-    /// Decide cores or units with proofs (DRAT) by the program CaDiCaL, and let another program check each; cases of units with a checked
+    /// Decide cores, half bridges or units with proofs (DRAT) by the program CaDiCaL, and let another program check each; cases of units with a checked
     /// proof are not repeated.
     #[arg(long)]
     certify: bool,
@@ -64,6 +68,7 @@ impl Arguments {
     pub(crate) const SHARE: Arguments = Arguments {
         machine: None,
         units: None,
+        bridges: false,
         jobs: 1,
         mutants: Some(1),
         only: None,
@@ -88,7 +93,7 @@ pub(crate) fn unit_share() -> Result<()> {
 pub(crate) fn inputs() -> Result<Inputs> {
     let library = Library::load(&root().join("rtl/units"))?;
     let own = Inputs::default()
-        .and((include_str!("formal.rs"), YOSYS, Z3, SAT))
+        .and((include_str!("formal.rs"), YOSYS, SAT))
         .files("tools/evidence/src/formal/core")?;
     let files = [
         "motor.py",
@@ -99,6 +104,7 @@ pub(crate) fn inputs() -> Result<Inputs> {
         "bank.v",
         "circuit.py",
         "core.py",
+        "induction.py",
         "solve.py",
         "unrolled.py",
         "word.v",
@@ -126,7 +132,10 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
     if let Some(names) = &arguments.units {
         return units::prove(arguments, names, false);
     }
-    let venv = Venv::with(&[YOSYS, Z3, SAT])?;
+    let venv = Venv::with(&[YOSYS, SAT])?;
+    if arguments.bridges {
+        return motor(&venv, arguments);
+    }
     let library = Library::load(&root().join("rtl/units"))?;
     let machines = match &arguments.machine {
         Some(name) => vec![machine::machine(name).map_err(anyhow::Error::msg)?],
@@ -154,7 +163,7 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
     for (family, proof) in FAMILIES.iter().filter_map(|family| Some((family, family.bank.as_ref()?))) {
         bank(&venv, &export(machines[0], &library)?, family, proof)?;
     }
-    motor(&venv)
+    motor(&venv, arguments)
 }
 
 /// Installs the program CaDiCaL if it lacks.
@@ -163,11 +172,22 @@ pub(crate) fn cadical() -> Result<()> {
 }
 
 /// Proves half bridges and trips of a board.
-fn motor(venv: &Venv) -> Result<()> {
+fn motor(venv: &Venv, arguments: &Arguments) -> Result<()> {
     let mut command = venv.command("python3")?;
     command.arg(root().join("rtl/formal/motor.py")).arg("--folder").arg(root().join("target/formal/motor"));
+    certified(&mut command, arguments.certify)?;
+    command.args(arguments.verbose.then_some("--verbose")).args(arguments.certify.then_some("--record"));
     let status = command.status().context("cannot start python3")?;
     ensure!(status.success(), "half bridges are not proved ({status})");
+    Ok(())
+}
+
+/// Lets a script decide by the program CaDiCaL, and check its proofs by this program, if asked to.
+fn certified(command: &mut Command, is_asked: bool) -> Result<()> {
+    if is_asked {
+        cadical()?;
+        command.arg("--certify").arg(std::env::current_exe().context("this program's file is unknown")?);
+    }
     Ok(())
 }
 

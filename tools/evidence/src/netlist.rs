@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! A core mapped by yosys to the cells of an FPGA family: in lockstep with the emulator, or proved to equal the Verilog.
+//! A core mapped by yosys to the cells of an FPGA family: in lockstep with the emulator, or proved to equal the Verilog; and a core as
+//! Verilator reads it, proved to equal what yosys reads ([`reading`]).
 //!
 //! yosys's own models translate cells back to Verilog; in lockstep, block RAMs and multipliers use the models for simulating a routed board
 //! ([`takt_family::Models`]). The proof, `rtl/formal/mapped.py`, cuts them out.
 
+mod reading;
 mod refusals;
 
 use crate::formal;
@@ -35,11 +37,14 @@ pub(crate) struct Arguments {
     /// out, and their inputs compared.
     #[arg(long, conflicts_with = "programs")]
     prove: bool,
-    /// Planted faults that the proof must refute, N of each kind.
-    #[arg(long, default_value_t = 20, value_name = "N", requires = "prove")]
+    /// Prove instead that Verilator reads the Verilog as yosys does: the core, and the modules in it.
+    #[arg(long, conflicts_with_all = ["programs", "prove"])]
+    reading: bool,
+    /// Planted faults that a proof must refute, N of each kind.
+    #[arg(long, default_value_t = 20, value_name = "N")]
     mutants: usize,
     /// Report for each planted fault the place that refuted it.
-    #[arg(long, requires = "prove")]
+    #[arg(long)]
     verbose: bool,
 }
 
@@ -55,6 +60,9 @@ const SHARE: (&str, usize) = ("t1", 1);
 /// # Errors
 /// If yosys fails, or the netlist is wrong.
 pub(crate) fn netlist(arguments: &Arguments) -> Result<()> {
+    if arguments.reading {
+        return reading::prove(arguments, true);
+    }
     if arguments.prove {
         return prove(arguments, true);
     }
@@ -69,10 +77,14 @@ pub(crate) fn inputs() -> Result<Inputs> {
     let commands = (core.synthesis.commands)(top, "", Mapping::of(core.machine));
     let equality = models.equality.map(|equality| ((equality.memories)(top), equality.cut, equality.clocked));
     let cells = (models.cells, models.mapped_library, models.mapped_table.techmap());
-    let own = (include_str!("netlist.rs"), include_str!("netlist/refusals.rs"), YOSYS, SAT, SHARE);
-    let key = Inputs::default().and((design, core.synthesis.files, commands, equality, cells, own));
+    let texts =
+        [include_str!("netlist.rs"), include_str!("netlist/reading.rs"), include_str!("netlist/refusals.rs")];
+    let own = (texts, YOSYS, SAT, SHARE);
+    let tools = Inputs::default().tool("verilator", "--version");
+    let key = tools.and((design, core.synthesis.files, commands, equality, cells, own));
     [
         "rtl/formal/mapped.py",
+        "rtl/formal/reading.py",
         "rtl/formal/solve.py",
         "rtl/formal/circuit.py",
         "tools/evidence/src/formal/drat.rs",
@@ -81,13 +93,20 @@ pub(crate) fn inputs() -> Result<Inputs> {
     .try_fold(key, Inputs::files)
 }
 
-/// Runs the proof of the test suite, and compares small circuits.
+/// Runs the proofs of the test suite, and compares small circuits.
 pub(crate) fn share() -> Result<()> {
     let (machine, mutants) = SHARE;
     refusals::refuse(&Venv::with(&[YOSYS, SAT])?)?;
-    let arguments =
-        Arguments { machine: machine.to_owned(), programs: 0, prove: true, mutants, verbose: false };
-    prove(&arguments, false)
+    let arguments = Arguments {
+        machine: machine.to_owned(),
+        programs: 0,
+        prove: true,
+        reading: false,
+        mutants,
+        verbose: false,
+    };
+    prove(&arguments, false)?;
+    reading::prove(&arguments, false)
 }
 
 /// A machine's core, and the family whose cells it is mapped to.

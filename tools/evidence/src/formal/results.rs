@@ -36,7 +36,9 @@ pub(crate) fn document() -> Result<(&'static str, String)> {
     let members: Vec<&str> = members.split('"').skip(1).step_by(2).collect();
     let whole = between(DOCUMENT, &text, ("proofs", "docs"), &table(&results))?;
     let whole = between(DOCUMENT, &whole, ("cores", "docs"), &cores(&results))?;
+    let whole = between(DOCUMENT, &whole, ("bridges", "docs"), &bridges(&results))?;
     let whole = between(DOCUMENT, &whole, ("mapped", "docs"), &mapped(&results))?;
+    let whole = between(DOCUMENT, &whole, ("readings", "docs"), &readings(&results))?;
     let whole = between(DOCUMENT, &whole, ("tests", "docs"), &modules(&members)?)?;
     let rows = page::rows()?;
     let whole = ["units", "core", "tools", "programs"].into_iter().try_fold(whole, |whole, section| {
@@ -136,6 +138,45 @@ fn cores(results: &Value) -> String {
         let _ = writeln!(
             text,
             "| {name} | {properties} | {invariants} | {registers} | {waits} cycles | {seconds} | {megabytes:.0} MB, {checking} s | {faults} | {date} |"
+        );
+    }
+    text
+}
+
+/// Table of the proofs of half bridges and trips.
+fn bridges(results: &Value) -> String {
+    let mut text = String::from(
+        "| what is proved | settings | s of solving | proofs checked | planted faults refuted | on |\n|---|---|---|---|---|---|\n",
+    );
+    for proof in results["motor"].as_object().into_iter().flatten().map(|(_, proof)| proof) {
+        let [settings, seconds, checking, refuted, tried] =
+            ["settings", "seconds", "checking", "refuted", "tried"].map(|key| proof[key].to_string());
+        let [said, date] = ["text", "date"].map(|key| proof[key].as_str().unwrap_or_default());
+        let megabytes = proof["bytes"].as_f64().unwrap_or_default() / 1e6;
+        let _ = writeln!(
+            text,
+            "| {said} | {settings} | {seconds} | {megabytes:.1} MB, {checking} s | {refuted} of {tried} | {date} |"
+        );
+    }
+    text
+}
+
+/// Table of the machines whose circuits Verilator and yosys read alike.
+fn readings(results: &Value) -> String {
+    let mut text = String::from(
+        "| machine | circuits | registers | output bits | pins of cells cut out | equal by structure | proofs checked | planted faults refuted | on |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
+    );
+    for (machine, of) in results["reading"].as_object().into_iter().flatten() {
+        let numbers = ["circuits", "registers", "outputs", "pins", "structure"];
+        let numbers = numbers.map(|key| of[key].to_string()).join(" | ");
+        let [proofs, seconds, checking, refuted] =
+            ["proofs", "seconds", "checking", "refuted"].map(|key| of[key].to_string());
+        let size = of["bytes"].as_f64().unwrap_or_default() / 1e6;
+        let date = of["date"].as_str().unwrap_or("–");
+        let _ = writeln!(
+            text,
+            "| {machine} | {numbers} | {proofs}: {size:.1} MB, {seconds} s, checking {checking} s | {refuted} | {date} |"
         );
     }
     text

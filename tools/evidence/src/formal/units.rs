@@ -62,10 +62,7 @@ pub(super) fn prove(arguments: &Arguments, names: &[String], share: bool) -> Res
     ]);
     command.args(share.then_some("--share")).args(arguments.again.then_some("--again"));
     command.args(arguments.verbose.then_some("--verbose"));
-    if arguments.certify {
-        super::cadical()?;
-        command.arg("--certify").arg(&own);
-    }
+    super::certified(&mut command, arguments.certify)?;
     for (option, value) in [("--only", &arguments.only), ("--cases", &arguments.cases)] {
         if let Some(value) = value {
             command.args([option, value]);

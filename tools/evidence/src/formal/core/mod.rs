@@ -85,10 +85,7 @@ pub(super) fn prove(venv: &Venv, design: &Design, way: &Way) -> Result<()> {
     fs::write(folder.join("question.json"), question.to_string())?;
     let mut command = venv.command("python3")?;
     command.arg(root().join("rtl/formal/core.py")).arg("--folder").arg(&folder);
-    if way.certify {
-        super::cadical()?;
-        command.arg("--certify").arg(std::env::current_exe().context("this program's file is unknown")?);
-    }
+    super::certified(&mut command, way.certify)?;
     if let Some(mutants) = way.mutants {
         command.args(["--mutants", &mutants.to_string()]);
         if design.latched > 0 {
