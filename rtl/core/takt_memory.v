@@ -134,7 +134,7 @@ module takt_memory #(
             end else begin : g_ecc
                 // The way from the block RAM takes half a cycle: the syndrome's place is known at its end, the word in the next one. The
                 // modules stay apart, so that synthesis, which does not count that half, gives each of them its least depth.
-                wire [6:0]  check;
+                wire [6:0]  syndrome;
                 wire [31:0] fixed;
                 wire [15:0] read_low;
                 wire [7:0]  read_high;
@@ -145,15 +145,15 @@ module takt_memory #(
                 reg         q_one_wrong, q_two_wrong;
                 (* keep_hierarchy = "yes" *)
                 takt_ecc_code #(.BITS(32)) checks (
-                    .data(read), .check(check), .low(16'd0), .high(8'd0), .corrected()
+                    .data(read), .given(loaded[WIDTH*p+32 +: 7]), .check(syndrome), .low(16'd0), .high(8'd0), .corrected()
                 );
                 (* keep_hierarchy = "yes" *)
                 takt_ecc_place place (
-                    .syndrome(check ^ loaded[WIDTH*p+32 +: 7]), .low(read_low), .high(read_high), .one_wrong(read_one_wrong), .two_wrong(read_two_wrong)
+                    .syndrome(syndrome), .low(read_low), .high(read_high), .one_wrong(read_one_wrong), .two_wrong(read_two_wrong)
                 );
                 always @(posedge clk) {q, low, high, q_one_wrong, q_two_wrong} <= {read, read_low, read_high, read_one_wrong, read_two_wrong};
                 takt_ecc_code #(.BITS(32), .CORRECTS(1)) corrects (
-                    .data(q), .check(), .low(low), .high(high), .corrected(fixed)
+                    .data(q), .given(7'd0), .check(), .low(low), .high(high), .corrected(fixed)
                 );
                 assign result[32*p +: 32] = fixed & {32{out_valid[p]}};
                 assign {one_wrong[p], two_wrong[p]} = {q_one_wrong, q_two_wrong};
@@ -167,7 +167,7 @@ module takt_memory #(
         end else begin : g_stored_with_check
             wire [6:0] check;
             takt_ecc_code #(.BITS(32)) encodes (
-                .data(value), .check(check), .low(16'd0), .high(8'd0), .corrected()
+                .data(value), .given(7'd0), .check(check), .low(16'd0), .high(8'd0), .corrected()
             );
             assign stored = {check, value};
         end

@@ -6,7 +6,7 @@
 // the syndrome odd, two make it even and not 0. The word 0 has the check bits 0, so that cleared memories are valid.
 //
 // Contract
-//   check: the check bits of data. Those of a word that was read, XOR the check bits that were read with it, are its syndrome.
+//   check: the check bits of data, XOR given. With the check bits that were read beside data as given, it is the word's syndrome.
 //   corrected: data without the wrong bit that low and high (takt_ecc_place) tell. With CORRECTS, this is what the module has; without, it
 //   has check, and corrected is 0.
 
@@ -15,6 +15,7 @@ module takt_ecc_code #(
     parameter CORRECTS = 0
 ) (
     input  wire [BITS-1:0] data,
+    input  wire [6:0]      given,
     output wire [6:0]      check,
     input  wire [15:0]     low,
     input  wire [7:0]      high,
@@ -50,7 +51,7 @@ module takt_ecc_code #(
                 for (i = 0; i < BITS; i = i + 1) begin : g_bit
                     assign taken[i] = data[i] & COLUMNS[7*i + k];
                 end
-                assign check[k] = ^taken;
+                assign check[k] = ^{taken, given[k]};
             end
             assign corrected = {BITS{1'b0}};
             wire unused = &{1'b0, low, high};
@@ -60,7 +61,7 @@ module takt_ecc_code #(
                 assign corrected[i] = data[i] ^ (low[COLUMN[3:0]] & high[COLUMN[6:4]]);
             end
             assign check = 7'd0;
-            wire unused = &{1'b0, low, high};
+            wire unused = &{1'b0, low, high, given};
         end
     endgenerate
 

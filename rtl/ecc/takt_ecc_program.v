@@ -40,7 +40,7 @@ module takt_ecc_program #(
     wire               legal   = ~|(write_word & ((48'd1 << LOW) - 48'd1));
     wire [BITS-1:0]    stored  = write_word[47:LOW] & {BITS{legal}};
     wire [ADDRESS-1:0] address = write ? write_address : scrub_address;
-    wire [6:0]         stored_check, kept_check, seen_check;
+    wire [6:0]         stored_check, kept_syndrome, next_syndrome;
 
     always @(posedge clk) begin
         if (write) words[address] <= {stored_check, stored};
@@ -49,7 +49,7 @@ module takt_ecc_program #(
     end
 
     takt_ecc_code #(.BITS(BITS)) encodes (
-        .data(stored), .check(stored_check), .low(16'd0), .high(8'd0), .corrected()
+        .data(stored), .given(7'd0), .check(stored_check), .low(16'd0), .high(8'd0), .corrected()
     );
     // The way from the block RAM takes half a cycle: the word is corrected in the decode stage. `checks` stays apart, so that synthesis,
     // which does not count that half, gives it the least depth.
@@ -61,31 +61,31 @@ module takt_ecc_program #(
     always @(posedge clk) begin
         if (advance) begin
             raw      <= kept[BITS-1:0];
-            syndrome <= kept_check ^ kept[BITS+6:BITS];
+            syndrome <= kept_syndrome;
         end
     end
     (* keep_hierarchy = "yes" *)
     takt_ecc_code #(.BITS(BITS)) checks (
-        .data(kept[BITS-1:0]), .check(kept_check), .low(16'd0), .high(8'd0), .corrected()
+        .data(kept[BITS-1:0]), .given(kept[BITS+6:BITS]), .check(kept_syndrome), .low(16'd0), .high(8'd0), .corrected()
     );
     takt_ecc_place place (
         .syndrome(syndrome), .low(low), .high(high), .one_wrong(one_wrong), .two_wrong(two_wrong)
     );
     takt_ecc_code #(.BITS(BITS), .CORRECTS(1)) corrects (
-        .data(raw), .check(), .low(low), .high(high), .corrected(decoded)
+        .data(raw), .given(7'd0), .check(), .low(low), .high(high), .corrected(decoded)
     );
 
     reg  [6:0]      seen_syndrome;
     wire [BITS-1:0] repaired;
-    always @(posedge clk) seen_syndrome <= seen_check ^ seen[BITS+6:BITS];
+    always @(posedge clk) seen_syndrome <= next_syndrome;
     takt_ecc_place scrub_place (
         .syndrome(seen_syndrome), .low(scrub_low), .high(scrub_high), .one_wrong(scrub_one_wrong), .two_wrong(scrub_two_wrong)
     );
     takt_ecc_code #(.BITS(BITS)) scrubs (
-        .data(seen[BITS-1:0]), .check(seen_check), .low(16'd0), .high(8'd0), .corrected()
+        .data(seen[BITS-1:0]), .given(seen[BITS+6:BITS]), .check(next_syndrome), .low(16'd0), .high(8'd0), .corrected()
     );
     takt_ecc_code #(.BITS(BITS), .CORRECTS(1)) repairs (
-        .data(seen[BITS-1:0]), .check(), .low(scrub_low), .high(scrub_high), .corrected(repaired)
+        .data(seen[BITS-1:0]), .given(7'd0), .check(), .low(scrub_low), .high(scrub_high), .corrected(repaired)
     );
 
     generate

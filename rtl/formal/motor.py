@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Proves by induction that two switches of a half bridge are never on together, that dead time and least times hold, and that a
-trip makes outputs safe in time, for every sequence of duties, trips, resets and enabling, at any carrier."""
+trip makes outputs safe in time, for every sequence of duties, trips, resets and enabling, at any carrier; and of memory words' code that
+it corrects one wrong bit and tells of two."""
 
 import argparse
 import sys
@@ -12,16 +13,20 @@ from balance import Unrolled
 from circuit import FORMAL, Failure, changed, read_aiger, yosys
 from solve import Certifier, remember
 
-BOARD = FORMAL.parent / "board" / "verilog"
-MODULES = ["takt_pwm_phase", "takt_pwm3", "takt_trip", "takt_filter"]
+# Modules by name, with their folders.
+MODULES = {name: FORMAL.parent / "board" / "verilog" for name in ("takt_pwm_phase", "takt_pwm3", "takt_trip", "takt_filter")}
+MODULES |= {name: FORMAL.parent / "ecc" for name in ("takt_ecc_code", "takt_ecc_place")}
 # Half a carrier's period, dead time, least time; mutants are tried with the last.
 PHASES = [(1250, 0, 0), (60, 1, 7), (65535, 1023, 1023), (1250, 25, 50)]
 # Filter, dead time, level while tripped, direct or not; mutants are tried with the last two.
 TRIPS = [(0, 2, 1, 0), (1, 0, 0, 0), (0, 0, 2, 1), (5, 3, 2, 0), (0, 3, 1, 1)]
+# Bits of a word: of a program with no bit left out, of data; mutants are tried with the last. A shorter word is one whose other bits are 0.
+CODES = [(48,), (32,)]
 # What each proof shows, for people.
 SHOWN = {
     "phase": "two switches of a half bridge are never on together, dead time and least times hold",
     "trip": "a trip is safe n + 3 cycles after its pin, at once if it is direct, and held until it is cleared",
+    "code": "one wrong bit of a memory word with its check bits is corrected, two are told",
 }
 # Strengthens the induction: a filter's count is below its end.
 COUNTS = """
@@ -56,11 +61,21 @@ TRIP_MUTANTS = [
     ("takt_pwm_phase", "if (off) begin\n            switches <= 2'b00;", "if (off) begin\n            switches <= switches;"),
     ("takt_filter", "rst | held == LAST[BITS-1:0]", "rst"),
 ]
+CODE_MUTANTS = [
+    ("takt_ecc_code", "found == ones", "found == ones - 1"),
+    ("takt_ecc_code", "ones = 3", "ones = 1"),
+    ("takt_ecc_code", "^{taken, given[k]}", "^taken"),
+    ("takt_ecc_code", "low[COLUMN[3:0]] & high[COLUMN[6:4]]", "low[COLUMN[3:0]]"),
+    ("takt_ecc_code", "low[COLUMN[3:0]] & high[COLUMN[6:4]]", "high[COLUMN[6:4]]"),
+    ("takt_ecc_place", "syndrome[6:4]", "syndrome[5:3]"),
+    ("takt_ecc_place", "^syndrome", "^syndrome[5:0]"),
+    ("takt_ecc_place", "& ~one_wrong", ""),
+]
 
 
 def texts(mutant=None):
     """The modules by name, with a mutant (module, old, new) in one of them."""
-    found = {name: (BOARD / f"{name}.v").read_text() for name in MODULES}
+    found = {name: (folder / f"{name}.v").read_text() for name, folder in MODULES.items()}
     return changed(found, [mutant[0]], mutant[1:]) if mutant else found
 
 
@@ -117,6 +132,13 @@ def trip(folder, setting, mutant=None, certifier=None):
     return proved(folder, files, "takt_tripped", parameters, setting[0] + setting[1] + 8, certifier)
 
 
+def code(folder, setting, mutant=None, certifier=None):
+    """Shows that the properties of `code.v` hold of a word of so many bits."""
+    found = texts(mutant)
+    files = {name: found[name] for name in ("takt_ecc_code", "takt_ecc_place")} | {"takt_code": (FORMAL / "code.v").read_text()}
+    return proved(folder, files, "takt_code", {"BITS": setting[0]}, 1, certifier)
+
+
 def refuted(prove, folder, settings, mutant):
     """The first question that a fault breaks, with one of the settings; None if the proof holds with it."""
     for setting in settings:
@@ -140,6 +162,7 @@ def main():
         for name, prove, settings, tries, mutants in [
             ("phase", phase, PHASES, 1, PHASE_MUTANTS),
             ("trip", trip, TRIPS, 2, TRIP_MUTANTS),
+            ("code", code, CODES, 1, CODE_MUTANTS),
         ]:
             found = []
             for setting in settings:
