@@ -72,6 +72,7 @@ module takt_sequencer #(
 
     localparam [2:0] OWN_SLOT    = SLOT;
     localparam [SLOTS-1:0] EARLIER = (1 << SLOT) - 1;  // the slots before its own
+    localparam [SLOTS-1:0] OTHERS  = ~(1 << SLOT);
     localparam LEVEL = $clog2(STACK);
     localparam [LEVEL:0]   ENTRY = 1;
     localparam [LEVEL-1:0] BELOW = 1;
@@ -231,7 +232,7 @@ module takt_sequencer #(
     assign published = (was_wait | was_publish) & ~fault;
 
     always @(posedge clk) begin
-        waiting    <= wait_next;
+        waiting    <= wait_next & ~(x_wait & (|(x_address_fault & OTHERS)));  // a load at fault may stand beside it
         remembered <= still | missed;
         if (missed) deadline_missed <= 1'b1;
         if (rst) begin

@@ -16,7 +16,15 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     let bit = ControlBit::Effect(Effect::ClearFlags);
     let clears = plan.slots.iter().filter(|slot| slot.has(bit)).map(|slot| slot.bit(Stage::Issue, bit));
     m.regs([net::X_CLEAR_FLAGS]);
-    let kept = net::STICKY & repeat(3, !net::X_CLEAR_FLAGS | net::FAULT);
+    let mut kept = net::STICKY & repeat(3, !net::X_CLEAR_FLAGS | net::FAULT);
+    if plan.clears_beside_faults() {
+        m.comment(
+            "The bundle that clears may be at fault, with an operation of another slot, which is known a cycle later: the flags come back.",
+        );
+        m.regs([net::CLEARED]);
+        m.clocked(vec![set(net::CLEARED, net::STICKY & repeat(3, net::X_CLEAR_FLAGS & !net::FAULT))]);
+        kept = kept | (net::CLEARED & repeat(3, net::FAULT));
+    }
     m.assign(net::STICKY_NOW, kept | net::NEW_FLAGS);
     m.assign(net::STATUS, net::STICKY_NOW);
     m.clocked(vec![

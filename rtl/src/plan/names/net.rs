@@ -198,4 +198,6 @@ nets! {
     NEW_FLAGS "new_flags" 3;
     /// The sticky flags are cleared.
     X_CLEAR_FLAGS "x_clear_flags";
+    /// Flags that have been cleared in the last cycle.
+    CLEARED "cleared" 3;
 }

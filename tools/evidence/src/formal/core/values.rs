@@ -292,7 +292,7 @@ impl Source {
         [bank, address]: [&str; 2],
         issues: &str,
         of: &mut Reference,
-    ) -> Copy {
+    ) -> Copied {
         let _ = writeln!(
             of.text,
             "    reg {own}_reads;
@@ -310,12 +310,12 @@ impl Source {
         // In reset all copies have what the loader has written.
         of.assumed.push(format!("(~{} | ({word} == f_word_{bank}))", net::RST));
         of.equal("word", &format!("~{}", net::RST), &word, &format!("f_word_{bank}"));
-        Copy { known, value }
+        Copied { known, value }
     }
 }
 
 /// Nets of a source's copy of a bank, in the cycle after a read.
-struct Copy {
+struct Copied {
     known: String,
     value: String,
 }
