@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     /// Stopped, it goes on where it was.
     #[arg(long, num_args = 0.., value_name = "NAME", conflicts_with = "machine")]
     units: Option<Vec<String>>,
-    /// Prove half bridges and trips alone.
+    /// Prove half bridges, trips and the code of memory words alone.
     #[arg(long, conflicts_with_all = ["machine", "units"])]
     bridges: bool,
     /// Of units: cases decided side by side.
@@ -171,14 +171,14 @@ pub(crate) fn cadical() -> Result<()> {
     if works("cadical", "--version") { Ok(()) } else { apt_install(&["cadical"]) }
 }
 
-/// Proves half bridges and trips of a board.
+/// Proves half bridges and trips of a board, and the code of memory words.
 fn motor(venv: &Venv, arguments: &Arguments) -> Result<()> {
     let mut command = venv.command("python3")?;
     command.arg(root().join("rtl/formal/motor.py")).arg("--folder").arg(root().join("target/formal/motor"));
     certified(&mut command, arguments.certify)?;
     command.args(arguments.verbose.then_some("--verbose")).args(arguments.certify.then_some("--record"));
     let status = command.status().context("cannot start python3")?;
-    ensure!(status.success(), "half bridges are not proved ({status})");
+    ensure!(status.success(), "half bridges, or the code of memory words, are not proved ({status})");
     Ok(())
 }
 
