@@ -132,26 +132,23 @@ module takt_memory #(
                 assign result[32*p +: 32] = q;
                 assign {one_wrong[p], two_wrong[p]} = 2'd0;
             end else begin : g_ecc
-                // The way from the block RAM takes half a cycle: the syndrome's place is known at its end, the word in the next one. The
-                // modules stay apart, so that synthesis, which does not count that half, gives each of them its least depth.
+                // The way from the block RAM takes half a cycle: the syndrome is known at its end, the word in the next one. The module stays
+                // apart, so that synthesis, which does not count that half, gives it its least depth.
                 wire [6:0]  syndrome;
                 wire [31:0] fixed;
-                wire [15:0] read_low;
-                wire [7:0]  read_high;
-                wire        read_one_wrong, read_two_wrong;
+                wire [15:0] low;
+                wire [7:0]  high;
                 reg  [31:0] q;
-                reg  [15:0] low;
-                reg  [7:0]  high;
-                reg         q_one_wrong, q_two_wrong;
+                reg  [6:0]  q_syndrome;
+                wire        q_one_wrong, q_two_wrong;
                 (* keep_hierarchy = "yes" *)
                 takt_ecc_code #(.BITS(32)) checks (
                     .data(read), .given(loaded[WIDTH*p+32 +: 7]), .check(syndrome), .low(16'd0), .high(8'd0), .corrected()
                 );
-                (* keep_hierarchy = "yes" *)
+                always @(posedge clk) {q, q_syndrome} <= {read, syndrome};
                 takt_ecc_place place (
-                    .syndrome(syndrome), .low(read_low), .high(read_high), .one_wrong(read_one_wrong), .two_wrong(read_two_wrong)
+                    .syndrome(q_syndrome), .low(low), .high(high), .one_wrong(q_one_wrong), .two_wrong(q_two_wrong)
                 );
-                always @(posedge clk) {q, low, high, q_one_wrong, q_two_wrong} <= {read, read_low, read_high, read_one_wrong, read_two_wrong};
                 takt_ecc_code #(.BITS(32), .CORRECTS(1)) corrects (
                     .data(q), .given(7'd0), .check(), .low(low), .high(high), .corrected(fixed)
                 );

@@ -2,7 +2,7 @@
 // takt_ecc_place: what the syndrome of a word tells (takt_ecc_code). No registers.
 //
 // Contract
-//   low, high: one-hot, the low 4 and the high 3 bits of the syndrome. They are apart from the correction, so that registers fit between.
+//   low, high: one-hot, the low 4 and the high 3 bits of the syndrome.
 //   one_wrong: one bit is wrong, perhaps a check bit; two_wrong: two are, and cannot be corrected.
 
 module takt_ecc_place (

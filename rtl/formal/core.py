@@ -16,7 +16,7 @@ from pysat.solvers import Solver
 
 import induction
 from balance import Unrolled
-from circuit import Failure, changed, planted, read_aiger, yosys
+from circuit import FORMAL, Failure, changed, planted, read_aiger, yosys
 from solve import SOLVER, Certifier, remember
 
 # File of the planted faults that a proof has not refuted.
