@@ -40,7 +40,8 @@ module takt_ecc_program #(
     wire               legal   = ~|(write_word & ((48'd1 << LOW) - 48'd1));
     wire [BITS-1:0]    stored  = write_word[47:LOW] & {BITS{legal}};
     wire [ADDRESS-1:0] address = write ? write_address : scrub_address;
-    wire [6:0]         stored_check, kept_syndrome, next_syndrome;
+    wire [6:0]         stored_check, kept_syndrome, next_syndrome, unused_check1, unused_check2;
+    wire [BITS-1:0]    unused_corrected1, unused_corrected2, unused_corrected3;
 
     always @(posedge clk) begin
         if (write) words[address] <= {stored_check, stored};
@@ -49,7 +50,7 @@ module takt_ecc_program #(
     end
 
     takt_ecc_code #(.BITS(BITS)) encodes (
-        .data(stored), .given(7'd0), .check(stored_check), .low(16'd0), .high(8'd0), .corrected()
+        .data(stored), .given(7'd0), .check(stored_check), .low(16'd0), .high(8'd0), .corrected(unused_corrected1)
     );
     // The way from the block RAM takes half a cycle: the word is corrected in the decode stage. `checks` stays apart, so that synthesis,
     // which does not count that half, gives it the least depth.
@@ -66,13 +67,13 @@ module takt_ecc_program #(
     end
     (* keep_hierarchy = "yes" *)
     takt_ecc_code #(.BITS(BITS)) checks (
-        .data(kept[BITS-1:0]), .given(kept[BITS+6:BITS]), .check(kept_syndrome), .low(16'd0), .high(8'd0), .corrected()
+        .data(kept[BITS-1:0]), .given(kept[BITS+6:BITS]), .check(kept_syndrome), .low(16'd0), .high(8'd0), .corrected(unused_corrected2)
     );
     takt_ecc_place place (
         .syndrome(syndrome), .low(low), .high(high), .one_wrong(one_wrong), .two_wrong(two_wrong)
     );
     takt_ecc_code #(.BITS(BITS), .CORRECTS(1)) corrects (
-        .data(raw), .given(7'd0), .check(), .low(low), .high(high), .corrected(decoded)
+        .data(raw), .given(7'd0), .check(unused_check1), .low(low), .high(high), .corrected(decoded)
     );
 
     reg  [6:0]      seen_syndrome;
@@ -82,10 +83,10 @@ module takt_ecc_program #(
         .syndrome(seen_syndrome), .low(scrub_low), .high(scrub_high), .one_wrong(scrub_one_wrong), .two_wrong(scrub_two_wrong)
     );
     takt_ecc_code #(.BITS(BITS)) scrubs (
-        .data(seen[BITS-1:0]), .given(seen[BITS+6:BITS]), .check(next_syndrome), .low(16'd0), .high(8'd0), .corrected()
+        .data(seen[BITS-1:0]), .given(seen[BITS+6:BITS]), .check(next_syndrome), .low(16'd0), .high(8'd0), .corrected(unused_corrected3)
     );
     takt_ecc_code #(.BITS(BITS), .CORRECTS(1)) repairs (
-        .data(seen[BITS-1:0]), .given(7'd0), .check(), .low(scrub_low), .high(scrub_high), .corrected(repaired)
+        .data(seen[BITS-1:0]), .given(7'd0), .check(unused_check2), .low(scrub_low), .high(scrub_high), .corrected(repaired)
     );
 
     generate

@@ -131,7 +131,8 @@ pub const REGISTERS: [Register; 34] = [
         "r",
         "bit 0 waiting, 1 halted, 2 fault, 6:4 slot of the fault, sticky flags: 7 overflow, 8 divide by zero, 9 invalid; 10 in reset, \
          11 drive, 17:12 what stopped the drive: fault, halt, deadline, host, stop, a NaN output; 18 a trip is held, \
-         19 a second core (docs/safety.md) has done something else, which stopped the drive, too",
+         19 a second core (docs/safety.md) has done something else, which stopped the drive, too, 20 a memory error, which did; \
+         31:24 corrected words since the start, at most 255, both with error correction (docs/safety.md)",
     ),
     register(3, "fault", "r", "15:0 bundle, 18:16 kind, as of the Wishbone slave (docs/hardware.md)"),
     register(4, "period", "rw", "cycles from tick to tick"),

@@ -158,12 +158,18 @@ fn memory(plan: &Plan, m: &mut Module) {
         );
         m.assign(net::STORED, net::DATA_WRITES & !net::REPAIRED);
     } else {
+        // What error correction alone needs.
+        let [one_wrong, two_wrong, corrected] =
+            [&plan.data_one_wrong(), &plan.data_two_wrong(), &net::DATA_CORRECTED]
+                .map(|net| m.discarded(net));
         m.instance(
-            memory.same([net::RST]).port("load_address", of_loader).port("write", net::STORED).open([
-                "one_wrong",
-                "two_wrong",
-                "corrected",
-            ]),
+            memory
+                .same([net::RST])
+                .port("load_address", of_loader)
+                .port("write", net::STORED)
+                .port("one_wrong", one_wrong)
+                .port("two_wrong", two_wrong)
+                .port("corrected", corrected),
         );
     }
     m.unused(plan.load_unused(), plan.load_valid(), None);

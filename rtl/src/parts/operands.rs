@@ -71,22 +71,20 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, number: u32, m: &mut Mod
         .port("r_waits", slot.source_waits(Stage::Read, operand))
         .port("i_waits", slot.source_waits(Stage::Issue, operand))
         .port("operand", slot.operand(operand));
-    if plan.ecc {
-        m.wires([slot.source_wrong(operand)]);
-    }
-    m.instance(if plan.ecc {
-        let source = source
-            .parameter("ECC", 1)
-            .same([net::SCRUBS])
-            .port("scrub_index", plan.scrub_address().low(plan.index));
-        let repairs = (number as usize) < ecc::REPAIRING;
-        let source =
-            if repairs { source.port("copies", slot.copies(operand)) } else { source.open(["copies"]) };
-        source.port("sound", slot.sound(operand)).port("wrong", slot.source_wrong(operand))
+    // What error correction alone needs. The scrubber takes words of the first sources' copies.
+    let [copies, sound, wrong] = [slot.copies(operand), slot.sound(operand), slot.source_wrong(operand)];
+    let source = if plan.ecc {
+        let copies = if (number as usize) < ecc::REPAIRING { copies } else { m.discarded(&copies) };
+        m.wires([wrong.clone()]);
+        let source = source.parameter("ECC", 1).same([net::SCRUBS]).port("copies", copies);
+        let source = source.port("scrub_index", plan.scrub_address().low(plan.index));
+        source.port("sound", sound).port("wrong", wrong)
     } else {
-        let nothing = source.port("scrubs", no()).port("scrub_index", decimal(plan.index, 0_u32));
-        nothing.open(["copies", "sound", "wrong"])
-    });
+        let source = source.port("scrubs", no()).port("scrub_index", decimal(plan.index, 0_u32));
+        let [copies, sound, wrong] = [&copies, &sound, &wrong].map(|net| m.discarded(net));
+        source.port("copies", copies).port("sound", sound).port("wrong", wrong)
+    };
+    m.instance(source);
 }
 
 /// Stall signals of all sources, for the bundle in a stage.

@@ -353,6 +353,13 @@ impl Module {
         self.add(Item::Nets { kind: Kind::Wire, nets: vec![net], value: Some(value.into()), remark: None });
     }
 
+    /// Declares a net for an output that nothing takes, as wide as another net, with a name that linters pass over.
+    pub(crate) fn discarded(&mut self, like: &Net) -> Net {
+        let net = Net::named(format!("unused_{}", like.name())).wide(like.width());
+        self.wires([net.clone()]);
+        net
+    }
+
     /// Marks bits of a net as possibly unused, for linters.
     pub(crate) fn unused(&mut self, net: Net, value: impl Into<Expr>, remark: Option<&'static str>) {
         let value = Some(concat([value.into(), no()]).every_bit());
