@@ -29,7 +29,7 @@ impl Plan {
     /// the first source's word and the second's.
     fn copies_of(&self, slot: &SlotPlan) -> ([Expr; 3], [Expr; 2]) {
         let sources: Vec<_> = self.sources().collect();
-        let sound = |&(of, operand): &(&SlotPlan, usize)| Expr::from(of.sound(operand).at(slot.number));
+        let sound = |&(of, operand): &(&SlotPlan, usize)| of.sound(operand).at(slot.number);
         let word = |&(of, operand): &(&SlotPlan, usize)| of.copies(operand).part(32 * slot.number, 32);
         let (first, second) = (&sources[0], sources.get(1).unwrap_or(&sources[0]));
         let damaged = any(sources.iter().map(|source| !sound(source)));
@@ -79,7 +79,7 @@ fn repaired_words(plan: &Plan) -> [Vec<Expr>; 4] {
     let (mut spaces, mut slots, mut values) = (Vec::new(), Vec::new(), Vec::new());
     let mut addresses = vec![wide(Expr::from(&address), 16 - address.width())];
     for (k, memory) in plan.memories().iter().enumerate() {
-        let repairs = || Expr::from(plan.repair().at(k as u32));
+        let repairs = || plan.repair().at(k as u32);
         match memory {
             Memory::Program(slot) => {
                 constant(&mut slots, 3, repairs(), slot.number);
@@ -114,7 +114,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     let memories = plan.memories();
     let wrong = memories.iter().map(|memory| match memory {
         Memory::Program(slot) => slot.scrub_one_wrong().into(),
-        Memory::Data => Expr::from(plan.data_one_wrong().at(0)),
+        Memory::Data => plan.data_one_wrong().at(0),
         Memory::Bank(slot) => {
             let ([first, second, damaged], _) = plan.copies_of(slot);
             // The bank's words stand at the first addresses.
@@ -126,7 +126,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     });
     let lost = memories.iter().map(|memory| match memory {
         Memory::Program(slot) => slot.scrub_two_wrong().into(),
-        Memory::Data => Expr::from(plan.data_two_wrong().at(0)),
+        Memory::Data => plan.data_two_wrong().at(0),
         Memory::Bank(slot) => {
             let ([first, second, _], _) = plan.copies_of(slot);
             !(first | second)
