@@ -6,6 +6,7 @@ use crate::campaign::record;
 use anyhow::{Context, Result};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use takt_family::Resources;
 use takt_rtl::synthesis::{self, Synthesis};
 
 /// Document with the tables.
@@ -183,18 +184,16 @@ pub(crate) fn cost() -> Result<String> {
          {REFERENCE_PART} --grade {GRADE}`, with `--ecc`, with `--second-core`):\n\n\
          | | t1 | with error correction | with a second core |\n|---|---|---|---|\n"
     );
-    let carries = |row: &Synthesis| row.resources.carries.unwrap_or(0);
-    let counts: [(&str, &dyn Fn(&Synthesis) -> u64); 5] = [
-        ("LUT4", &|row| row.resources.luts - carries(row)),
-        ("LUT4 and halves of carry cells", &|row| row.resources.luts),
-        ("flip-flops", &|row| row.resources.flip_flops),
-        ("multipliers", &|row| row.resources.multipliers),
-        ("block RAMs", &|row| row.resources.block_rams),
-    ];
-    for (name, count) in counts {
-        let _ = write!(text, "| {name} | {} |", count(plain));
-        for row in others {
-            let _ = write!(text, " {} (× {:.2}) |", count(row), count(row) as f64 / count(plain) as f64);
+    let names = ["LUT4", "LUT4 and halves of carry cells", "flip-flops", "multipliers", "block RAMs"];
+    let counts = |row: &Synthesis| {
+        let Resources { luts, carries, flip_flops, multipliers, block_rams } = row.resources;
+        [luts - carries.unwrap_or(0), luts, flip_flops, multipliers, block_rams]
+    };
+    let [plain_counts, with_codes, paired] = [plain, others[0], others[1]].map(counts);
+    for (k, name) in names.into_iter().enumerate() {
+        let _ = write!(text, "| {name} | {} |", plain_counts[k]);
+        for count in [with_codes[k], paired[k]] {
+            let _ = write!(text, " {count} (× {:.2}) |", count as f64 / plain_counts[k] as f64);
         }
         text.push('\n');
     }
