@@ -65,14 +65,14 @@ def graph(folder, asked):
         (folder / file).write_text((FORMAL / file).read_text())
     script = [f"read_verilog -lib {' '.join(asked['cut'])}", f"read_verilog -sv {' '.join(asked['read'])} bank.v"]
     script += [f"hierarchy -check -top {top}", "proc", "flatten", "memory_collect", f"memory_map {top}/sequencer.*"]
-    # Of the other memories one word is left, an arbitrary one, as of the banks.
+    # Each other memory keeps one word, an arbitrary one, as a bank does.
     script += ["techmap -map word.v", f"cd {top}"]
     script += [f"connect -nounset -set {memory}.probe {address}" for memory, address in asked["words"]]
     script += [f"connect -nounset -set {name} {path}" for name, path in asked["inner"]]
     script += ["cd ..", "cutpoint -blackbox", f"delete -port {top}/o:*"]
     script += [f"expose {top}/w:{name}" for name in ("f_bad", "f_assumed", "f_issues")]
     script += [f"expose -input {top}/w:{name}" for name in asked["constants"]]
-    # Whatever Verilog leaves undefined is arbitrary in each cycle: before anything is optimised.
+    # Undefined values are arbitrary in each cycle. They are made free before anything is optimised.
     script += ["opt_clean -purge", f"select -assert-none {top}/t:$mem*", "setundef -undriven -anyseq"]
     script += ["opt_expr", "opt_merge", "opt_clean", "dffunmap", "techmap", "opt_expr", "opt_merge", "aigmap", "opt_clean"]
     script += ["write_aiger -ascii -symbols core.aag"]

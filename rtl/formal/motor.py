@@ -22,7 +22,7 @@ PHASES = [(1250, 0, 0), (60, 1, 7), (65535, 1023, 1023), (1250, 25, 50)]
 TRIPS = [(0, 2, 1, 0), (1, 0, 0, 0), (0, 0, 2, 1), (5, 3, 2, 0), (0, 3, 1, 1)]
 # Bits of a word: of a program with no bit left out, of data; mutants are tried with the last. A shorter word is one whose other bits are 0.
 CODES = [(48,), (32,)]
-# What each proof shows, for people.
+# Statement of each proof, for people.
 SHOWN = {
     "phase": "two switches of a half bridge are never on together, dead time and least times hold",
     "trip": "a trip is safe n + 3 cycles after its pin, at once if it is direct, and held until it is cleared",

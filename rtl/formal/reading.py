@@ -221,7 +221,7 @@ class Circuit:
         if edges == ["POS"]:
             clock = self.targets(tree.find("senitem")[0], scope)
             self.clocked.append((body, scope, clock))
-            # What a blocking assignment gives is read in the block alone.
+            # The value of a blocking assignment is read in the block alone.
             for bit in (bit for bit, kind in assigned.items() if kind == "assigndly"):
                 if bit in self.registers:
                     raise Failure("`{}` [{}] is assigned by two clocked blocks".format(*bit))
@@ -238,7 +238,7 @@ class Circuit:
         """Enters what registers, or words of a table, begin with."""
         for one in node.iter():
             if one.tag == "assign":
-                # Of a variable in a generate block, what it begins with stands outside of the block, and in its declaration.
+                # The initial value of a variable in a generate block stands outside of the block, and in its declaration.
                 if one[1].tag == "varref" and one[1].get("name") not in scope.names:
                     continue
                 for bit, value in zip(self.targets(one[1], scope), self.evaluate(one[0], scope, None)):
@@ -292,7 +292,7 @@ class Circuit:
         read = lambda name, i: given[name, i] if given and (name, i) in given else self.value(name, i)
         of = lambda one: self.evaluate(one, scope, given)
         if tag == "const":
-            # What is undefined is arbitrary, wherever it stands.
+            # Undefined values are arbitrary, wherever they stand.
             undefined = lambda: self.logic.input(f"undefined {len(self.logic.nodes)}")
             return [int(digit) if digit in "01" else undefined() for digit in self.digits(node)]
         if tag == "varref":
@@ -436,11 +436,11 @@ class Circuit:
             elif node.tag == "case":
                 word, items = self.evaluate(node[0], scope, before), [*node[1:]]
                 values = {one.get("name") for item in items for one in item if one.tag == "const"}
-                # Of a case that has every value, one item is the last.
+                # A case that has every value ends with one of its items.
                 full = len(values) == 1 << len(word) and not any(set(self.digits(one)) - {"0", "1"} for item in items for one in item if one.tag == "const")
                 self.cases(word, items, full, scope, before, after)
             elif node.tag == "while":
-                # What comes before the condition, the condition, and what is repeated.
+                # A loop has statements before the condition, the condition, and a body.
                 self.execute(node[0], scope, before, after)
                 while (goes := self.place(self.evaluate(node[1][0], scope, before))) == TRUE:
                     self.execute(node[2:], scope, before, after)
@@ -460,7 +460,7 @@ class Circuit:
         for which, target in enumerate((before, after) if after is not before else (before,)):
             one, zero = sides[0][which], sides[1][which]
             for bit in one.keys() | zero.keys():
-                # What a side has not assigned, it keeps.
+                # A side keeps the bits that it has not assigned.
                 values = [side[bit] if bit in side else self.kept(bit) for side in (one, zero)]
                 target[bit] = None if None in values else self.logic.choose(select, *values)
 

@@ -2,10 +2,11 @@
 //! Boards whose cores have error correction: no pin changes, wrong bits are corrected and counted, and a wrong word that cannot be corrected
 //! makes the outputs safe.
 
+use crate::second_core::is_safe_before_a_pin_is_wrong;
 use crate::system::ulx3s;
-use crate::top::{PERIOD, WIRING, have_the_same_pins, periods, runs_talks_and_fails_safe, safe, target};
+use crate::top::{WIRING, have_the_same_pins, runs_talks_and_fails_safe, safe, target};
 use std::path::Path;
-use takt_board::simulation::{EncoderMotion, Simulation};
+use takt_board::simulation::Simulation;
 use takt_board::{Board, Host, Wiring, top};
 use takt_isa::Program;
 
@@ -71,27 +72,7 @@ fn a_wrong_word_makes_outputs_safe() {
         ("{^input_write_value[31:24],", "{^input_write_value[31:24] ^ (input_write_value == 32'd6),");
     let right = Simulation::new(&board, &wiring(), &program, &folder.join("right")).expect("it starts");
     let mut both = [right, changed(&board, &program, &folder.join("wrong"), "takt_source.v", from, to)];
-    for sim in &mut both {
-        periods(sim, 8);
-        let pins = ["encoder_a", "encoder_b"].map(|pin| sim.input(pin).expect("a pin"));
-        sim.turns = vec![EncoderMotion { pins, from: 0, by: 5 }];
-        periods(sim, 2);
-        sim.turns = vec![EncoderMotion { pins, from: 5, by: 1 }];
-    }
-    let mut safe_for = 0;
-    for cycle in 0..4 * PERIOD {
-        let [right, wrong] = both.each_mut().map(|sim| {
-            sim.run(1, &[]).expect("it runs");
-            let levels = sim.output_levels().map(|(level, _)| level).collect::<Vec<_>>();
-            sim.outputs().iter().cloned().zip(levels).collect::<Vec<_>>()
-        });
-        if wrong.iter().any(|(pin, high)| pin == "signal_drive" && *high) {
-            assert_eq!(right, wrong, "cycle {cycle}");
-        } else {
-            safe_for += 1;
-        }
-    }
-    assert!(safe_for > PERIOD, "{safe_for}");
+    is_safe_before_a_pin_is_wrong(&mut both, "a wrong parity");
     let [_, mut wrong] = both;
     assert!(safe(&mut wrong));
     let mut host = Host::connect(wrong, 3).unwrap_or_else(|error| panic!("{error}"));

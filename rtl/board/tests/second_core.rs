@@ -52,6 +52,34 @@ fn a_second_core_changes_no_pin() {
     have_the_same_pins(&mut both);
 }
 
+/// Turns the encoder of two boards, the first a right one, to 6: until the outputs of the second are safe, all pins are alike, cycle by cycle.
+pub(crate) fn is_safe_before_a_pin_is_wrong(both: &mut [Simulation; 2], name: &str) {
+    for sim in both.iter_mut() {
+        periods(sim, 8);
+        let pins = ["encoder_a", "encoder_b"].map(|pin| sim.input(pin).expect("a pin"));
+        sim.turns = vec![EncoderMotion { pins, from: 0, by: 5 }];
+        periods(sim, 2);
+        sim.turns = vec![EncoderMotion { pins, from: 5, by: 1 }];
+    }
+    let mut safe_for = 0;
+    for cycle in 0..4 * PERIOD {
+        let [right, wrong] = both.each_mut().map(|sim| {
+            sim.run(1, &[]).expect("it runs");
+            sim.outputs().iter().cloned().zip(sim.output_levels().map(|(level, _)| level)).collect::<Vec<_>>()
+        });
+        let level = |pins: &[(String, bool)], name: &str| pins.iter().any(|(pin, high)| pin == name && *high);
+        assert!(level(&right, "signal_drive"), "cycle {cycle}");
+        if level(&wrong, "signal_drive") {
+            assert_eq!(right, wrong, "{name}, cycle {cycle}");
+        } else {
+            // A pin follows a cycle later.
+            assert!(!level(&wrong, "lamp_out") || safe_for == 0, "cycle {cycle}");
+            safe_for += 1;
+        }
+    }
+    assert!(safe_for > PERIOD, "{safe_for}");
+}
+
 /// With the longest delay, too, the outputs are safe before a pin shows what a wrong first core computes; the host reads the cause, and a
 /// start lets the board drive again.
 #[test]
@@ -61,35 +89,7 @@ fn a_difference_makes_outputs_safe_before_a_pin_is_wrong() {
         let right = wiring(delay);
         let right = Simulation::new(&board, &right, &program, &folder.join("right")).expect("it starts");
         let mut both = [right, with_a_difference(delay, &program, &folder.join("wrong"))];
-        for sim in &mut both {
-            periods(sim, 8);
-            let pins = ["encoder_a", "encoder_b"].map(|pin| sim.input(pin).expect("a pin"));
-            sim.turns = vec![EncoderMotion { pins, from: 0, by: 5 }];
-            periods(sim, 2);
-            sim.turns = vec![EncoderMotion { pins, from: 5, by: 1 }];
-        }
-        let mut safe_for = 0;
-        for cycle in 0..4 * PERIOD {
-            let [right, wrong] = both.each_mut().map(|sim| {
-                sim.run(1, &[]).expect("it runs");
-                sim.outputs()
-                    .iter()
-                    .cloned()
-                    .zip(sim.output_levels().map(|(level, _)| level))
-                    .collect::<Vec<_>>()
-            });
-            let level =
-                |pins: &[(String, bool)], name: &str| pins.iter().any(|(pin, high)| pin == name && *high);
-            assert!(level(&right, "signal_drive"), "cycle {cycle}");
-            if level(&wrong, "signal_drive") {
-                assert_eq!(right, wrong, "delay {delay}, cycle {cycle}");
-            } else {
-                // A pin follows a cycle later.
-                assert!(!level(&wrong, "lamp_out") || safe_for == 0, "cycle {cycle}");
-                safe_for += 1;
-            }
-        }
-        assert!(safe_for > PERIOD, "{safe_for}");
+        is_safe_before_a_pin_is_wrong(&mut both, &format!("delay {delay}"));
         let [_, mut wrong] = both;
         assert!(safe(&mut wrong));
         let mut host = Host::connect(wrong, 3).unwrap_or_else(|error| panic!("{error}"));

@@ -16,23 +16,29 @@ pub(crate) fn pair(machine: &'static Machine, latched: u16) -> Design {
     design.latching(latched).and_then(|design| design.with(safety)).expect("every core can be a pair")
 }
 
-fn start(design: &Design) -> Simulation {
+/// A simulation of a design.
+pub(crate) fn start(design: &Design) -> Simulation {
     let model = Model::build(design, &folder(), false).unwrap_or_else(|error| panic!("{error}"));
     model.start(&[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Runs random programs and tracking on a design in lockstep with the emulator.
+pub(crate) fn runs_as_the_emulator(machine: &'static Machine, design: &Design) {
+    let mut simulation = start(design);
+    let mut coverage = random::Coverage::default();
+    for seed in 0..100 {
+        simulation = random::run(seed, machine, simulation, &mut coverage)
+            .and_then(|simulation| random::run_short(seed, machine, simulation, &mut coverage))
+            .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
+    }
+    assert!(coverage.missed > 100 && coverage.faults.len() > 4, "{coverage:?}");
+    track(&assemble(machine, "hybrid/tracking.s"), simulation, 50);
 }
 
 #[test]
 fn no_cycle_of_any_program_changes() {
     for machine in [&T1, &T3] {
-        let mut simulation = start(&pair(machine, 0));
-        let mut coverage = random::Coverage::default();
-        for seed in 0..100 {
-            simulation = random::run(seed, machine, simulation, &mut coverage)
-                .and_then(|simulation| random::run_short(seed, machine, simulation, &mut coverage))
-                .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
-        }
-        assert!(coverage.missed > 100 && coverage.faults.len() > 4, "{coverage:?}");
-        track(&assemble(machine, "hybrid/tracking.s"), simulation, 50);
+        runs_as_the_emulator(machine, &pair(machine, 0));
     }
 }
 

@@ -25,8 +25,8 @@ impl Plan {
         programs.chain([Memory::Data]).chain(self.slots.iter().map(Memory::Bank)).collect()
     }
 
-    /// What the scrubber finds of a slot's bank: the word is sound in the first source's copy, in the second's; it is not in one of all;
-    /// the first source's word and the second's.
+    /// Words of a slot's bank at the scrubber's address: the first source's word is sound, the second source's is, one of all sources is not;
+    /// the first source's word and the second source's.
     fn copies_of(&self, slot: &SlotPlan) -> ([Expr; 3], [Expr; 2]) {
         let sources: Vec<_> = self.sources().collect();
         let sound = |&(of, operand): &(&SlotPlan, usize)| of.sound(operand).at(slot.number);
