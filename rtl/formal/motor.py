@@ -86,7 +86,8 @@ def joined(text, properties):
 
 
 def questions(graph, cycles):
-    """From the initial values, no assertion fails in so many cycles; after so many cycles in which none fails, none does in the next one."""
+    """From the initial values, no assertion fails in so many cycles; after so many cycles in which none fails, none does in the next one.
+    Without latches every cycle is as the first."""
     for name, begins, lasts in (("from reset", graph.initial, cycles), ("a cycle later", {}, cycles + 1)):
         gates, assumed, bad = Unrolled(), [], []
         state = {latch: begins[latch] if latch in begins else gates.free() for latch in graph.latches}
@@ -98,6 +99,8 @@ def questions(graph, cycles):
             assumed += [one ^ 1 for earlier in bad[:-1] for one in earlier]
             bad = bad[-1:]
         yield name, gates, assumed, [one for cycle in bad for one in cycle]
+        if not graph.latches:
+            return
 
 
 def proved(folder, files, top, parameters, cycles, certifier=None):
