@@ -41,6 +41,8 @@ struct CoreReport {
     cycles: u32,
     most_cycles: u32,
     halted: bool,
+    /// Corrected words of memories since the start, at most 255; 0 without error correction.
+    corrections: u32,
     /// Bundle of the operation that faulted.
     fault: Option<u32>,
 }
@@ -76,6 +78,7 @@ impl Report {
                 cycles,
                 most_cycles,
                 halted: status.halted(),
+                corrections: status.corrections(),
                 fault: status.fault().then_some(fault & 0xffff),
             });
         }
@@ -125,13 +128,18 @@ impl fmt::Display for Report {
         for trip in &self.trips {
             writeln!(f, "  {trip}")?;
         }
-        for CoreReport { name, periods, misses, cycles, most_cycles, halted, fault } in &self.cores {
+        for core in &self.cores {
+            let CoreReport { name, periods, misses, cycles, most_cycles, halted, corrections, fault } = core;
             let title = if name.is_empty() { String::new() } else { format!("{name}: ") };
             let halted = if *halted { ", halted" } else { "" };
+            let corrected = match corrections {
+                0 => String::new(),
+                count => format!(", corrections {count}"),
+            };
             let fault = fault.map_or(String::new(), |bundle| format!(", fault at bundle {bundle}"));
             writeln!(
                 f,
-                "  {title}periods {periods}, misses {misses}, cycles {cycles}, most_cycles {most_cycles}{halted}{fault}"
+                "  {title}periods {periods}, misses {misses}, cycles {cycles}, most_cycles {most_cycles}{halted}{corrected}{fault}"
             )?;
         }
         for fifo in &self.fifos {

@@ -126,6 +126,7 @@ impl Board {
                 let of = if ["errors", "lost"].contains(&name) { 0 } else { core };
                 counters.push((name, host.register_of(of, name)?));
             }
+            counters.push(("corrections", status.corrections()));
             Ok((status.activity(control), status.drives(), status.causes().collect(), fault, counters))
         })
         .map_err(failed)

@@ -53,7 +53,7 @@ class BoardStatus:
     state: str
     #: Whether the outputs drive; otherwise they are at their safe levels.
     drives: bool
-    #: Causes of safe outputs: `fault`, `halt`, `missed deadline`, `host silent`, `stop`, `NaN output`.
+    #: Causes of safe outputs: `fault`, `halt`, `missed deadline`, `host silent`, `stop`, `NaN output`, `trip`, `cores differ`, `memory error`.
     causes: tuple[str, ...]
     #: Bundle and kind of a fault; None without a fault.
     fault: tuple[int, str] | None
@@ -65,6 +65,8 @@ class BoardStatus:
     most_cycles: int
     errors: int
     lost: int
+    #: Since the start: words of memories that error correction has mended, at most 255.
+    corrections: int
 
 
 @dataclass(frozen=True)
