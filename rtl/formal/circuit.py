@@ -14,14 +14,19 @@ UNITS = FORMAL.parent / "units"
 # Row of the lists of faults in tests: unit or module, text to replace, replacement.
 PLANTED = re.compile(r'^    \("(\w+)", "((?:[^"\\]|\\.)*)", "((?:[^"\\]|\\.)*)"\),$', re.M)
 
+# List of faults in tests: its name and its rows.
+LIST = re.compile(r"^const (\w+): &\[Fault\] = &\[\n(.*?)^\];$", re.M | re.S)
+
 
 class Failure(Exception):
     """A proof that failed or could not be made; the text is for the user."""
 
 
-def planted(tests, name):
-    """The faults that the tests in a folder of `rtl` plant in a unit or a module, (old, new)."""
+def planted(tests, name, lists=None):
+    """The faults that the tests in a folder of `rtl` plant in a unit or a module, (old, new); of some of their lists, or of all."""
     text = (FORMAL.parent / tests / "faults.rs").read_text()
+    if lists is not None:
+        text = "\n".join(body for of, body in LIST.findall(text) if of in lists)
     plain = lambda quoted: quoted.replace('\\"', '"').replace("\\\\", "\\")
     return [(plain(old), plain(new)) for of, old, new in PLANTED.findall(text) if of == name]
 

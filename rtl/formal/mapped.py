@@ -423,7 +423,7 @@ class Progress:
 
 
 def prove(comparison, certifier, what):
-    """Proves that the netlists never differ; returns figures."""
+    """Proves that the netlists never differ; returns figures. Without a certifier there are no proofs that another program checks."""
     for name, i in comparison.bases():
         raise Failure(f"the register `{name}` [{i}] begins with another value")
     differences = comparison.differences()
@@ -433,7 +433,7 @@ def prove(comparison, certifier, what):
     progress = Progress(f"{what}: proofs", len(unequal))
     for number, ((kind, name), bits) in enumerate(unequal.items()):
         asked = question(comparison.logic, bits)
-        proof = asked.refuted(certifier, number, asked.wrong())
+        proof = asked.decided(number, asked.wrong(), certifier)
         if proof is None:
             raise Failure(counterexample(asked, kind, name))
         solving, size, checking = solving + proof[0], size + proof[1], checking + proof[2]
@@ -587,7 +587,7 @@ def main():
     parser.add_argument("folder", type=Path, help="of the netlists source.json and gates.json")
     parser.add_argument("--name", required=True)
     parser.add_argument("--clocked", nargs="*", default=[], metavar="CELL[.PIN]", help="cells or pins that are cut out and sampled by the clock")
-    parser.add_argument("--checker", required=True, help="this program's command drat checks proofs")
+    parser.add_argument("--certify", metavar="CHECKER", help=solve.CERTIFY)
     parser.add_argument("--mutants", type=int, default=0, help="faults to plant of each kind")
     parser.add_argument("--record", action="store_true")
     parser.add_argument("--verbose", action="store_true")
@@ -596,12 +596,12 @@ def main():
     try:
         source, mapped = (Netlist(arguments.folder / f"{of}.json") for of in ("source", "gates"))
         comparison = Comparison(source, mapped, clocked)
-        figures = prove(comparison, solve.Certifier(arguments.folder, arguments.checker), name)
+        figures = prove(comparison, solve.certifier(arguments.folder, arguments.certify), name)
         figures["cut"] = cut_out(source)
         print(
             "{}: equal: next states of {registers} registers ({mapped} mapped: {merged} merged with others, {constant} constant, {unread} read "
-            "by nothing), {outputs} output bits, {pins} inputs of cells cut out; {structure} bits by structure, the others by {proofs} proofs "
-            "({bytes} bytes), {seconds} s, checked in {checking} s".format(name, **figures)
+            "by nothing), {outputs} output bits, {pins} inputs of cells cut out; {structure} bits by structure, the others by {proofs} proofs, "
+            "{seconds} s{certified}".format(name, certified=solve.certified(arguments.certify, figures), **figures)
         )
         for cell, count in figures["cut"].items():
             print(f"{name}: cut out: {cell}: {count}", flush=True)

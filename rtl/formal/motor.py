@@ -9,9 +9,10 @@ import time
 from pathlib import Path
 
 import induction
+import solve
 from balance import Unrolled
 from circuit import FORMAL, Failure, changed, read_aiger, yosys
-from solve import Certifier, remember
+from solve import remember
 
 # Modules by name, with their folders.
 MODULES = {name: FORMAL.parent / "board" / "verilog" for name in ("takt_pwm_phase", "takt_pwm3", "takt_trip", "takt_filter")}
@@ -86,8 +87,7 @@ def joined(text, properties):
 
 
 def questions(graph, cycles):
-    """From the initial values, no assertion fails in so many cycles; after so many cycles in which none fails, none does in the next one.
-    Without latches every cycle is as the first."""
+    """From the initial values, no assertion fails in so many cycles; after so many cycles in which none fails, none does in the next one."""
     for name, begins, lasts in (("from reset", graph.initial, cycles), ("a cycle later", {}, cycles + 1)):
         gates, assumed, bad = Unrolled(), [], []
         state = {latch: begins[latch] if latch in begins else gates.free() for latch in graph.latches}
@@ -99,8 +99,16 @@ def questions(graph, cycles):
             assumed += [one ^ 1 for earlier in bad[:-1] for one in earlier]
             bad = bad[-1:]
         yield name, gates, assumed, [one for cycle in bad for one in cycle]
-        if not graph.latches:
-            return
+
+
+def in_order(graph):
+    """Of a graph without latches: no assertion fails where those before it hold."""
+    gates = Unrolled()
+    outputs, _ = gates.cycle(graph, {}, {name: gates.free() for name in graph.inputs})
+    assumed = [outputs[name] for name in outputs if name.startswith("assumed[")]
+    for number, bad in enumerate(outputs[name] for name in outputs if name.startswith("bad[")):
+        yield f"assertion {number}", gates, assumed, [bad]
+        assumed = [*assumed, bad ^ 1]
 
 
 def proved(folder, files, top, parameters, cycles, certifier=None):
@@ -116,7 +124,8 @@ def proved(folder, files, top, parameters, cycles, certifier=None):
     script += ["setundef -undriven -anyseq", "dffunmap", "opt_clean", "techmap", "opt_expr", "opt_merge", "aigmap", "opt_clean"]
     script += ["write_aiger -ascii -symbols motor.aag"]
     yosys(folder, script)
-    return induction.decided(questions(read_aiger((folder / "motor.aag").read_text()), cycles), certifier)
+    graph = read_aiger((folder / "motor.aag").read_text())
+    return induction.decided(questions(graph, cycles) if graph.latches else in_order(graph), certifier)
 
 
 def phase(folder, setting, mutant=None, certifier=None):
@@ -155,7 +164,7 @@ def refuted(prove, folder, settings, mutant):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", required=True)
-    parser.add_argument("--certify", metavar="CHECKER", help="decide with proofs, and check each by this program's command drat")
+    parser.add_argument("--certify", metavar="CHECKER", help=solve.CERTIFY)
     parser.add_argument("--verbose", action="store_true", help="tell how each planted fault was refuted")
     parser.add_argument("--record", action="store_true", help="write the result down")
     arguments = parser.parse_args()
@@ -171,11 +180,11 @@ def main():
             for setting in settings:
                 own = folder / f"{name}{'_'.join(map(str, setting))}"
                 try:
-                    found.append(prove(own, setting, certifier=Certifier(own, arguments.certify) if arguments.certify else None))
+                    found.append(prove(own, setting, certifier=solve.certifier(own, arguments.certify)))
                 except induction.Refuted as refusal:
                     raise Failure(f"motor: {name} with {setting}: not proved: {refusal}") from None
             solving, size, checking = map(sum, zip(*found))
-            certified = f"; proofs of {size / 1e6:.1f} MB checked in {checking:.0f} s" if arguments.certify else ""
+            certified = solve.certified(arguments.certify, {"bytes": size, "checking": checking})
             print(f"motor: {SHOWN[name]}: proved for any number of cycles, {len(settings)} settings; {solving:.0f} s of solving{certified}", flush=True)
             survived = 0
             for mutant in mutants:

@@ -128,7 +128,7 @@ class Session:
         started = time.monotonic()
         # Words of tables and enumerated operands are no questions to a solver.
         is_solved = not (proof.table or proof.enumerated)
-        certifier = solve.Certifier(folder, self.arguments.certify) if self.arguments.certify and is_solved else None
+        certifier = solve.certifier(folder, self.arguments.certify if is_solved else None)
         ask = self.question(folder, graph, proof)
         found = solve.prove(proof.name, ask, proof.parts, self.arguments.jobs, record, chosen, certifier)
         if found is not None:
@@ -253,7 +253,7 @@ def main():
     parser.add_argument("--mutants", type=int, default=0, help="the first so many of each unit; all unless stated")
     parser.add_argument("--cases", type=cases)
     parser.add_argument("--only", help="one proof of the unit's, or timing, or mutants")
-    parser.add_argument("--certify", metavar="CHECKER", help="decide with proofs, and check each by this program's command drat")
+    parser.add_argument("--certify", metavar="CHECKER", help=solve.CERTIFY)
     parser.add_argument("--share", action="store_true")
     parser.add_argument("--again", action="store_true")
     parser.add_argument("--verbose", action="store_true")

@@ -17,7 +17,7 @@ from pathlib import Path
 import mapped
 from circuit import Failure, yosys
 from mapped import FALSE, TRUE, Logic
-from solve import Certifier, remember
+from solve import CERTIFY, certified, certifier, remember
 
 # Type of the cells that stand for `*` in both netlists: two ways to multiply have too little in common for a solver.
 TIMES = "takt_times"
@@ -614,7 +614,7 @@ class Readings:
         self.arguments = arguments
         self.folder = Path(arguments.folder)
         self.asked = json.loads((self.folder / "question.json").read_text())
-        self.certifier = Certifier(self.folder, arguments.checker)
+        self.certifier = certifier(self.folder, arguments.certify)
         self.figures = {"circuits": 0, "registers": 0, "outputs": 0, "pins": 0, "structure": 0, "proofs": 0, "seconds": 0, "bytes": 0, "checking": 0}
         self.refuted = 0
 
@@ -663,7 +663,7 @@ class Readings:
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", help="of the core's files and question.json")
-    parser.add_argument("--checker", required=True, help="this program's command drat checks proofs")
+    parser.add_argument("--certify", metavar="CHECKER", help=CERTIFY)
     parser.add_argument("--mutants", type=int, default=0, help="faults to plant of each kind in each circuit of Verilator's reading")
     parser.add_argument("--record", action="store_true")
     parser.add_argument("--verbose", action="store_true")
@@ -678,8 +678,13 @@ def main():
         sys.exit(f"error: {machine}: {failure}")
     print(
         "{}: Verilator reads {circuits} circuits as yosys does: {registers} registers, {outputs} output bits, {pins} inputs of cells cut out; {structure} "
-        "bits by structure, the others by {proofs} proofs ({bytes} bytes), {seconds} s, checked in {checking} s; {refuted} planted faults refuted; "
-        "{all:.0f} s".format(machine, **readings.figures, refuted=readings.refuted, all=time.monotonic() - started),
+        "bits by structure, the others by {proofs} proofs, {seconds} s{certified}; {refuted} planted faults refuted; {all:.0f} s".format(
+            machine,
+            **readings.figures,
+            certified=certified(arguments.certify, readings.figures),
+            refuted=readings.refuted,
+            all=time.monotonic() - started,
+        ),
         flush=True,
     )
     if arguments.record:

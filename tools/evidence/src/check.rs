@@ -11,10 +11,10 @@ use takt_automation::progress;
 /// The checks to run.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// The checks by name, which then run even if they have passed with the same files; without names, formal, units, netlist, clients,
-    /// litex and certificates.
+    /// The checks by name, which then run even if they have passed with the same files; without names, formal, bridges, units, netlist,
+    /// clients, litex and certificates.
     names: Vec<String>,
-    /// Run all, those that take longer too: placed and routed boards, a bitstream for each family, FMUs in Wine, LinuxCNC.
+    /// Run all, those that take longer too: every core, placed and routed boards, a bitstream for each family, FMUs in Wine, LinuxCNC.
     #[arg(long, conflicts_with = "names")]
     all: bool,
 }
@@ -29,13 +29,9 @@ struct Share {
     run: fn() -> Result<()>,
 }
 
-const SHARES: [Share; 10] = [
-    Share {
-        name: "formal",
-        is_short: true,
-        inputs: Some(formal::inputs),
-        run: || formal::formal(&formal::Arguments::SHARE),
-    },
+const SHARES: [Share; 12] = [
+    Share { name: "formal", is_short: true, inputs: Some(formal::core_inputs), run: formal::core_share },
+    Share { name: "bridges", is_short: true, inputs: Some(formal::bridge_inputs), run: formal::bridges },
     Share { name: "units", is_short: true, inputs: Some(formal::unit_inputs), run: formal::unit_share },
     Share { name: "netlist", is_short: true, inputs: Some(netlist::inputs), run: netlist::share },
     Share { name: "clients", is_short: true, inputs: Some(clients::inputs), run: clients::test },
@@ -46,6 +42,7 @@ const SHARES: [Share; 10] = [
         inputs: Some(certificates::inputs),
         run: certificates::check,
     },
+    Share { name: "cores", is_short: false, inputs: Some(formal::core_inputs), run: formal::cores },
     Share { name: "routed", is_short: false, inputs: Some(routed::inputs), run: routed::test },
     // The tools may change unnoticed, so this check never counts as passed.
     Share { name: "boards", is_short: false, inputs: None, run: boards::one_of_each },
@@ -107,18 +104,17 @@ mod tests {
     /// The hash that lets a proof be skipped covers all files that the proof reads.
     #[test]
     fn the_keys_of_proofs_cover_the_files_that_they_read() {
-        let [formal, units, netlist] = [&SHARES[0], &SHARES[1], &SHARES[2]]
-            .map(|share| share.inputs.expect("files are known")().expect("inputs"));
+        let keys @ [_, _, units, _] = &["formal", "bridges", "units", "netlist"].map(|name| {
+            let share = SHARES.iter().find(|share| share.name == name).expect("a share");
+            share.inputs.expect("files are known")().expect("inputs")
+        });
         let folder = takt_automation::command::root().join("rtl/formal");
         for entry in std::fs::read_dir(folder).expect("rtl/formal") {
             let name = entry.expect("an entry").file_name().display().to_string();
             let path = format!("rtl/formal/{name}");
             // `mutants.py` is not a proof: it plants faults for `cargo evidence mutants`.
             if name != "mutants.py" && (name.ends_with(".py") || name.ends_with(".v")) {
-                assert!(
-                    [&formal, &units, &netlist].iter().any(|key| key.covers(&path)),
-                    "{path} is in no key"
-                );
+                assert!(keys.iter().any(|key| key.covers(&path)), "{path} is in no key");
             }
         }
         for path in ["rtl/units/add.v", "rtl/tests/faults.rs", "rtl/formal/prove.py", "isa/src/fp/mod.rs"] {

@@ -3,13 +3,11 @@
 //! core keeps the rules of issue, `units.rs` the units.
 
 mod core;
-mod drat;
 mod enumerate;
 pub(crate) mod results;
 mod tables;
 mod units;
 
-pub(crate) use drat::{Arguments as DratArguments, drat};
 pub(crate) use enumerate::{Arguments as EnumerateArguments, enumerate};
 pub(crate) use tables::tables;
 
@@ -17,16 +15,16 @@ use anyhow::{Context, Result, ensure};
 use std::fs;
 use std::process::Command;
 use takt_automation::check_cache::Inputs;
-use takt_automation::command::{apt_install, root, works};
+use takt_automation::command::{apt_install, cargo, root, run, works};
 use takt_automation::venv::{SAT, Venv, YOSYS};
 use takt_diagnostics::machine;
 use takt_family::{FAMILIES, Family, Proof};
-use takt_isa::T1;
 use takt_isa::spec::machines::MACHINES;
+use takt_isa::{Machine, T1};
 use takt_rtl::export::{DesignFile, export, modules};
 use takt_rtl::{Design, Library};
 
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 pub(crate) struct Arguments {
     /// The machine, by its name or a file with its row (`my.toml`); every one of the table unless stated.
     #[arg(long)]
@@ -61,14 +59,11 @@ pub(crate) struct Arguments {
     /// Report for each planted fault the condition that refuted it.
     #[arg(long)]
     verbose: bool,
-    /// Leave out the longest proofs, as the test suite does.
-    #[arg(skip)]
-    is_share: bool,
 }
 
 impl Arguments {
-    /// Proofs in the test suite: every core, with latched ports t1's; for each unit the short proofs, and one planted fault.
-    pub(crate) const SHARE: Arguments = Arguments {
+    /// Proofs in the test suite: for each unit the short ones, and one planted fault in each part.
+    const SHARE: Arguments = Arguments {
         machine: None,
         units: None,
         bridges: false,
@@ -79,7 +74,6 @@ impl Arguments {
         again: false,
         certify: false,
         verbose: false,
-        is_share: true,
     };
 }
 
@@ -93,18 +87,10 @@ pub(crate) fn unit_share() -> Result<()> {
     units::prove(&Arguments::SHARE, &[], true)
 }
 
-/// Inputs of the proofs: circuits, depth, tools.
-pub(crate) fn inputs() -> Result<Inputs> {
+/// Inputs of the cores' proofs: circuits, planted faults, proof scripts, tools.
+pub(crate) fn core_inputs() -> Result<Inputs> {
     let library = Library::load(&root().join("rtl/units"))?;
-    let own = Inputs::default()
-        .and((include_str!("formal.rs"), YOSYS, SAT))
-        .files("tools/evidence/src/formal/core")?;
-    let files = [
-        "motor.py",
-        "phase.v",
-        "trip.v",
-        "held.v",
-        "code.v",
+    let python = [
         "balance.py",
         "bank.v",
         "circuit.py",
@@ -113,17 +99,12 @@ pub(crate) fn inputs() -> Result<Inputs> {
         "solve.py",
         "unrolled.py",
         "word.v",
-    ]
-    .map(|name| format!("rtl/formal/{name}"));
-    let circuits = ["takt_pwm_phase", "takt_pwm3", "takt_trip", "takt_filter"]
-        .map(|name| format!("rtl/board/verilog/{name}.v"));
-    let codes = ["takt_ecc_code", "takt_ecc_place"].map(|name| format!("rtl/ecc/{name}.v"));
-    let own = files
-        .iter()
-        .chain(&circuits)
-        .chain(&codes)
-        .map(String::as_str)
-        .try_fold(own.files("rtl/cosim/tests/faults.rs")?, Inputs::files)?;
+    ];
+    let own = files("rtl/formal", &python, Inputs::default())?
+        .and((include_str!("formal.rs"), YOSYS, SAT))
+        .files("tools/evidence/src/formal/core")?
+        .files("rtl/formal/fresh.json")?
+        .files("rtl/cosim/tests/faults.rs")?;
     MACHINES.iter().try_fold(own, |inputs, machine| {
         let design = export(machine, &library)?;
         let texts = |files: &[DesignFile]| {
@@ -132,6 +113,51 @@ pub(crate) fn inputs() -> Result<Inputs> {
         let own: Vec<_> = FAMILIES.iter().flat_map(|family| texts(&modules(family))).collect();
         Ok(inputs.and((machine.name, texts(&design.files), own)))
     })
+}
+
+/// Inputs of the proofs of half bridges, trips and the code of memory words.
+pub(crate) fn bridge_inputs() -> Result<Inputs> {
+    let own = Inputs::default().and((include_str!("formal.rs"), YOSYS, SAT));
+    let python = [
+        "motor.py",
+        "phase.v",
+        "trip.v",
+        "held.v",
+        "code.v",
+        "balance.py",
+        "circuit.py",
+        "induction.py",
+        "solve.py",
+        "unrolled.py",
+    ];
+    let own = files("rtl/formal", &python, own)?;
+    let circuits = ["takt_pwm_phase.v", "takt_pwm3.v", "takt_trip.v", "takt_filter.v"];
+    let own = files("rtl/board/verilog", &circuits, own)?;
+    files("rtl/ecc", &["takt_ecc_code.v", "takt_ecc_place.v"], own)
+}
+
+/// Adds files of a folder.
+fn files(folder: &str, names: &[&str], inputs: Inputs) -> Result<Inputs> {
+    names.iter().try_fold(inputs, |inputs, name| inputs.files(&format!("{folder}/{name}")))
+}
+
+/// Runs the cores' proofs of the test suite: t1 with planted faults and with latched ports, and banks.
+pub(crate) fn core_share() -> Result<()> {
+    let (venv, library) = (Venv::with(&[YOSYS, SAT])?, Library::load(&root().join("rtl/units"))?);
+    core(&venv, &library, &T1, &Arguments::SHARE)?;
+    banks(&venv, &library)
+}
+
+/// Runs the proof of every core, without planted faults.
+pub(crate) fn cores() -> Result<()> {
+    let (venv, library) = (Venv::with(&[YOSYS, SAT])?, Library::load(&root().join("rtl/units"))?);
+    let all = Arguments { mutants: None, ..Arguments::SHARE };
+    MACHINES.iter().try_for_each(|machine| core(&venv, &library, machine, &all))
+}
+
+/// Runs the proofs of half bridges, trips and the code of memory words.
+pub(crate) fn bridges() -> Result<()> {
+    motor(&Venv::with(&[YOSYS, SAT])?, &Arguments::SHARE)
 }
 
 /// Entry of `cargo evidence formal`.
@@ -149,32 +175,36 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
         None => MACHINES.to_vec(),
     };
     for machine in &machines {
-        let is_table = MACHINES.iter().any(|row| row.name == machine.name);
-        let way = core::Way {
-            certify: arguments.certify,
-            mutants: arguments.mutants.filter(|_| arguments.machine.is_some() || machine.name == T1.name),
-            verbose: arguments.verbose,
-            record: arguments.certify && is_table,
-        };
-        let design = export(machine, &library)?;
-        core::prove(&venv, &design, &way)?;
-        // Programs may have latched ports: the core has other gates then.
-        if !arguments.is_share || machine.name == T1.name {
-            core::prove(&venv, &design.latching(machine.inputs.depth)?, &way)?;
-        }
+        let mutants = arguments.mutants.filter(|_| arguments.machine.is_some() || machine.name == T1.name);
+        core(&venv, &library, machine, &Arguments { mutants, ..arguments.clone() })?;
     }
     if arguments.machine.is_some() {
         return Ok(());
     }
-    for (family, proof) in FAMILIES.iter().filter_map(|family| Some((family, family.bank.as_ref()?))) {
-        bank(&venv, &export(machines[0], &library)?, family, proof)?;
-    }
+    banks(&venv, &library)?;
     motor(&venv, arguments)
 }
 
-/// Installs the program CaDiCaL if it lacks.
-pub(crate) fn cadical() -> Result<()> {
-    if works("cadical", "--version") { Ok(()) } else { apt_install(&["cadical"]) }
+/// Proves a core, and the core with latched ports: programs may have them, and the core has other gates then.
+fn core(venv: &Venv, library: &Library, machine: &'static Machine, arguments: &Arguments) -> Result<()> {
+    let way = core::Way {
+        certify: arguments.certify,
+        mutants: arguments.mutants,
+        verbose: arguments.verbose,
+        record: arguments.certify && MACHINES.iter().any(|row| row.name == machine.name),
+    };
+    let design = export(machine, library)?;
+    core::prove(venv, &design, &way)?;
+    core::prove(venv, &design.latching(machine.inputs.depth)?, &way)
+}
+
+/// Compares the banks of all families that have their own.
+fn banks(venv: &Venv, library: &Library) -> Result<()> {
+    let own = FAMILIES.iter().filter_map(|family| Some((family, family.bank.as_ref()?)));
+    for (family, proof) in own {
+        bank(venv, &export(&T1, library)?, family, proof)?;
+    }
+    Ok(())
 }
 
 /// Proves half bridges and trips of a board, and the code of memory words.
@@ -188,12 +218,24 @@ fn motor(venv: &Venv, arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Lets a script decide by the program CaDiCaL, and check its proofs by this program, if asked to.
-fn certified(command: &mut Command, is_asked: bool) -> Result<()> {
-    if is_asked {
-        cadical()?;
-        command.arg("--certify").arg(std::env::current_exe().context("this program's file is unknown")?);
+/// Version of the checker of proofs.
+const RATE: &str = "0.3.0";
+
+/// Lets a script decide by the program CaDiCaL and check its proofs by the program `rate`, if asked to; installs both.
+pub(crate) fn certified(command: &mut Command, is_asked: bool) -> Result<()> {
+    if !is_asked {
+        return Ok(());
     }
+    if !works("cadical", "--version") {
+        apt_install(&["cadical"])?;
+    }
+    let tools = root().join("target/tools");
+    let rate = tools.join("bin/rate");
+    if !rate.is_file() {
+        eprintln!("installing rate {RATE} in {}", tools.display());
+        run(cargo().args(["install", "rate", "--locked", "--version", RATE, "--root"]).arg(&tools))?;
+    }
+    command.arg("--certify").arg(rate);
     Ok(())
 }
 

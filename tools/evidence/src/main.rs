@@ -52,9 +52,6 @@ enum Task {
     /// Try every operand of a function that `formal --units` has made of a unit.
     #[command(hide = true)]
     Enumerate(formal::EnumerateArguments),
-    /// Check a proof that a formula has no solution.
-    #[command(hide = true)]
-    Drat(formal::DratArguments),
     /// Print the words of the units' tables, which `formal --units` compares with those of the circuits.
     #[command(hide = true)]
     Tables,
@@ -108,7 +105,6 @@ fn task(task: Task) -> Result<()> {
         Task::Docs { check } => documents::run(check),
         Task::Formal(arguments) => formal::formal(&arguments),
         Task::Enumerate(arguments) => formal::enumerate(&arguments),
-        Task::Drat(arguments) => formal::drat(&arguments),
         Task::Tables => formal::tables(),
         Task::Mutants(arguments) => mutants::mutants(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),

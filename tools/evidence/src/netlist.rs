@@ -82,15 +82,9 @@ pub(crate) fn inputs() -> Result<Inputs> {
     let own = (texts, YOSYS, SAT, SHARE);
     let tools = Inputs::default().tool("verilator", "--version");
     let key = tools.and((design, core.synthesis.files, commands, equality, cells, own));
-    [
-        "rtl/formal/mapped.py",
-        "rtl/formal/reading.py",
-        "rtl/formal/solve.py",
-        "rtl/formal/circuit.py",
-        "tools/evidence/src/formal/drat.rs",
-    ]
-    .into_iter()
-    .try_fold(key, Inputs::files)
+    ["rtl/formal/mapped.py", "rtl/formal/reading.py", "rtl/formal/solve.py", "rtl/formal/circuit.py"]
+        .into_iter()
+        .try_fold(key, Inputs::files)
 }
 
 /// Runs the proofs of the test suite, and compares small circuits.
@@ -258,7 +252,6 @@ fn prove(arguments: &Arguments, is_recorded: bool) -> Result<()> {
     let family = core.family.text;
     let equality = core.models.equality.with_context(|| format!("no proof is stated for {family}"))?;
     let name = core.machine.name;
-    formal::cadical()?;
     let mapped = core.map(Venv::with(&[YOSYS, SAT])?)?;
     let cells = mapped.reduce(true)?;
     let top = &mapped.core.design.top;
@@ -277,6 +270,7 @@ fn prove(arguments: &Arguments, is_recorded: bool) -> Result<()> {
     let mut command = python(&mapped.venv, &mapped.folder, name)?;
     command.args(["--mutants", &arguments.mutants.to_string()]);
     command.args(is_recorded.then_some("--record")).args(arguments.verbose.then_some("--verbose"));
+    formal::certified(&mut command, is_recorded)?;
     command.arg("--clocked").args(equality.clocked);
     let status =
         progress::step(&format!("{name}: proof"), || command.status().context("cannot start python3"))?;
@@ -296,6 +290,5 @@ fn gates(top: &str, netlist: &str) -> String {
 fn python(venv: &Venv, folder: &Path, name: &str) -> Result<Command> {
     let mut command = venv.command("python3")?;
     command.arg(root().join("rtl/formal/mapped.py")).arg(folder).args(["--name", name]);
-    command.arg("--checker").arg(std::env::current_exe().context("this program's file is unknown")?);
     Ok(command)
 }

@@ -35,14 +35,13 @@ pub(super) fn prove(arguments: &Arguments, is_recorded: bool) -> Result<()> {
     };
     let question = json!({ "machine": name, "top": design.top, "read": names(&read), "cut": names(&cut) });
     fs::write(folder.join("question.json"), question.to_string())?;
-    formal::cadical()?;
     if !works("verilator", "--version") {
         apt_install(&["verilator"])?;
     }
     let venv = Venv::with(&[YOSYS, SAT])?;
     let mut command = venv.command("python3")?;
     command.arg(root().join("rtl/formal/reading.py")).arg(&folder);
-    command.arg("--checker").arg(std::env::current_exe().context("this program's file is unknown")?);
+    formal::certified(&mut command, is_recorded)?;
     command.args(["--mutants", &arguments.mutants.to_string()]);
     command.args(is_recorded.then_some("--record")).args(arguments.verbose.then_some("--verbose"));
     let status = progress::step(&format!("{name}: second reading"), || {
