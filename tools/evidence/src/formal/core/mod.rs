@@ -11,6 +11,7 @@ mod effects;
 mod invariants;
 mod memory;
 mod outputs;
+mod retired;
 mod rules;
 mod sequence;
 mod values;
@@ -71,6 +72,7 @@ pub(super) fn prove(venv: &Venv, design: &Design, way: &Way) -> Result<()> {
     effects::add(plan, &mut of);
     memory::add(plan, &mut of);
     outputs::add(plan, design.latched > 0, &mut of);
+    retired::add(plan, &mut of);
     sequence::add(plan, &mut of);
     invariants::add(plan, &mut of);
     let (mut read, mut cut) = (Vec::new(), Vec::new());

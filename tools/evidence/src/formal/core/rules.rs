@@ -446,6 +446,20 @@ fn properties(plan: &Plan, of: &mut Reference) {
         &net::TICK_LOST.to_string(),
         &format!("{} & ~f_waiting & f_remembered", net::TICKS),
     );
+    let missed = format!("f_live & {} & ~f_waiting & ~f_remembered", net::TICKS);
+    let _ = writeln!(
+        of.text,
+        "    reg f_deadline;
+    always @(posedge {}) f_deadline <= ~{} & (f_deadline | ({missed}));",
+        net::CLK,
+        net::RST
+    );
+    of.promise(
+        "the pin of missed deadlines is high after the first tick that comes too early, until reset",
+        "f_live",
+        &net::DEADLINE_MISSED.to_string(),
+        "f_deadline",
+    );
     let most = longest(plan);
     of.promise(
         format!("a legal bundle waits for rules 2 to 6 for {most} cycles at most"),
