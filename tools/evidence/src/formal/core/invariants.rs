@@ -256,7 +256,7 @@ fn ages(late: &LateUnit) -> u32 {
 }
 
 /// Net: the age of a unit's operation, one-hot.
-fn age(slot: &SlotPlan, late: &LateUnit, of: &mut Reference) -> String {
+pub(super) fn age(slot: &SlotPlan, late: &LateUnit, of: &mut Reference) -> String {
     of.seen(&format!("{}.age", slot.late_instance(late)), &format!("[{}:1]", ages(late)))
 }
 

@@ -2,6 +2,7 @@
 //! Addresses of the bundles whose results are written back, as the pins for verification show them.
 
 use super::decoded::Decoded;
+use super::invariants::age;
 use super::rules::{Reference, booked, places};
 use std::fmt::Write as _;
 use takt_rtl::plan::names::net;
@@ -31,10 +32,7 @@ pub(super) fn add(plan: &Plan, of: &mut Reference) {
             );
         }
         for late in &slot.late {
-            let age = of.seen(
-                &format!("{}.age", slot.late_instance(late)),
-                &format!("[{}:1]", late.beyond.max(late.unit.interval - 1)),
-            );
+            let age = age(slot, late, of);
             for k in 1..=late.beyond {
                 of.equal(
                     "address",
@@ -52,6 +50,7 @@ fn address(slot: &SlotPlan, place: u32) -> String {
     format!("f_{}_from[{} +: {ADDRESS}]", slot.name(), ADDRESS * place)
 }
 
+/// The addresses of a slot, a place for each cycle to the writeback.
 fn declare(slot: &SlotPlan, of: &mut Reference) {
     let (name, clk, issue) = (slot.name(), net::CLK, net::I_ADDRESS);
     let result = Decoded { slot, stage: Stage::Issue }.result();
