@@ -434,6 +434,17 @@ fn properties(plan: &Plan, of: &mut Reference) {
             &register(plan, slot, 0),
         );
     }
+    for slot in &plan.slots {
+        of.promise(
+            format!(
+                "`{}`: after a fault, results of bundles before it are written, and no others",
+                slot.name()
+            ),
+            &format!("~{} & {}", net::RST, net::FAULT),
+            &slot.writes().to_string(),
+            &format!("f_{}_sure[0]", slot.name()),
+        );
+    }
     of.promise(
         "a tick that comes too early is reported, and no other",
         "f_live",
