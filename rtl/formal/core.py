@@ -24,8 +24,8 @@ from solve import SOLVER, literal
 
 # Faults planted by people who had seen neither properties nor invariants: by machine [module, old, new, how it shows].
 FRESH = FORMAL / "fresh.json"
-# Line of the top that the reference follows.
-REFERENCE = "    // Reference.\n"
+# First words of the reference in the top.
+REFERENCE = "    // ---- reference, properties and invariants"
 # Input that chooses a planted fault in each module, from 1, and its bits.
 CHOICE, CHOICES = "f_planted", 10
 # Cycles of reset. The loader is silent in them; in others the core ignores it.

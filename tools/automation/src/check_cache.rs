@@ -122,7 +122,7 @@ const fn check(name: &'static str, command: &'static str, seconds: Option<f64>) 
 pub const CHECKS: [Check; 15] = [
     check("formal", "cargo evidence check formal", Some(200.0)),
     check("bridges", "cargo evidence check bridges", Some(70.0)),
-    check("cores", "cargo evidence check cores", Some(1000.0)),
+    check("cores", "cargo evidence check cores", None),
     check("units", "cargo evidence check units", Some(100.0)),
     check("netlist", "cargo evidence check netlist", Some(110.0)),
     check(OPERANDS, "cargo evidence formal --units", Some(900.0)),

@@ -39,8 +39,6 @@ pub(super) const LATCHED: &str = ", latched ports";
 
 /// Part that is cut out, beside the units.
 const CUT: &str = "takt_program.v";
-/// Line of the top that the reference follows; `rtl/formal/core.py` plants faults before it.
-const REFERENCE: &str = "    // Reference.";
 /// Part in whose place its contract stands, as a circuit.
 const BANK: &str = "takt_bank.v";
 
@@ -80,7 +78,7 @@ pub(super) fn prove(venv: &Venv, design: &Design, way: &Way) -> Result<()> {
         let mut text = file.text.clone();
         if file.base() == format!("{}.v", design.top) {
             let end = text.rfind("endmodule").context("a module ends")?;
-            text.insert_str(end, &format!("{REFERENCE}\n{}", of.within()));
+            text.insert_str(end, &of.within());
             // A misspelt name would become a net that nothing drives, with an arbitrary value, so forbid implicit nets.
             text = format!("{}`default_nettype none\n{text}`default_nettype wire\n", of.modules);
         }

@@ -66,7 +66,7 @@ impl Reference {
         self.bad.push((format!("({when}) & (({left}) != ({right}))"), says.into()));
     }
 
-    /// Text within the core's module, with the conditions as the bits of `f_bad`, the first lowest.
+    /// Text within the core's module, with the conditions as the bits of `f_bad`, the first lowest. `rtl/formal/core.py` finds its first line.
     pub(super) fn within(&self) -> String {
         let bad: Vec<&str> = self.bad.iter().rev().map(|(text, _)| text.as_str()).collect();
         format!(
@@ -445,11 +445,12 @@ fn properties(plan: &Plan, of: &mut Reference) {
             &format!("f_{}_sure[0]", slot.name()),
         );
     }
+    let early = format!("{} & ~f_waiting & ~f_remembered", net::TICKS);
     of.promise(
         "a tick that comes too early is reported, and no other",
         "f_live",
         &net::TICK_MISSED.to_string(),
-        &format!("{} & ~f_waiting & ~f_remembered", net::TICKS),
+        &early,
     );
     of.promise(
         "a tick that is lost is reported, and no other",
@@ -457,11 +458,10 @@ fn properties(plan: &Plan, of: &mut Reference) {
         &net::TICK_LOST.to_string(),
         &format!("{} & ~f_waiting & f_remembered", net::TICKS),
     );
-    let missed = format!("f_live & {} & ~f_waiting & ~f_remembered", net::TICKS);
     let _ = writeln!(
         of.text,
         "    reg f_deadline;
-    always @(posedge {}) f_deadline <= ~{} & (f_deadline | ({missed}));",
+    always @(posedge {}) f_deadline <= ~{} & (f_deadline | (f_live & {early}));",
         net::CLK,
         net::RST
     );
