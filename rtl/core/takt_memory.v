@@ -135,25 +135,19 @@ module takt_memory #(
                 // The way from the block RAM takes half a cycle: the syndrome is known at its end, the word in the next one. The module stays
                 // apart, so that synthesis, which does not count that half, gives it its least depth.
                 wire [6:0]  syndrome, unused_check;
-                wire [31:0] fixed, unused_corrected;
-                wire [15:0] low;
-                wire [7:0]  high;
+                wire [31:0] fixed;
+                wire [33:0] unused;
                 reg  [31:0] q;
                 reg  [6:0]  q_syndrome;
-                wire        q_one_wrong, q_two_wrong;
                 (* keep_hierarchy = "yes" *)
                 takt_ecc_code #(.BITS(32)) checks (
-                    .data(read), .given(loaded[WIDTH*p+32 +: 7]), .check(syndrome), .low(16'd0), .high(8'd0), .corrected(unused_corrected)
+                    .data(read), .given(loaded[WIDTH*p+32 +: 7]), .check(syndrome), .corrected(unused[33:2]), .wrong(unused[1:0])
                 );
                 always @(posedge clk) {q, q_syndrome} <= {read, syndrome};
-                takt_ecc_place place (
-                    .syndrome(q_syndrome), .low(low), .high(high), .one_wrong(q_one_wrong), .two_wrong(q_two_wrong)
-                );
                 takt_ecc_code #(.BITS(32), .CORRECTS(1)) corrects (
-                    .data(q), .given(7'd0), .check(unused_check), .low(low), .high(high), .corrected(fixed)
+                    .data(q), .given(q_syndrome), .check(unused_check), .corrected(fixed), .wrong({two_wrong[p], one_wrong[p]})
                 );
                 assign result[32*p +: 32] = fixed & {32{out_valid[p]}};
-                assign {one_wrong[p], two_wrong[p]} = {q_one_wrong, q_two_wrong};
                 if (p == 0) assign corrected = fixed;
             end
         end
@@ -163,9 +157,9 @@ module takt_memory #(
             assign corrected = 32'd0;
         end else begin : g_stored_with_check
             wire [6:0]  check;
-            wire [31:0] unused;
+            wire [33:0] unused;
             takt_ecc_code #(.BITS(32)) encodes (
-                .data(value), .given(7'd0), .check(check), .low(16'd0), .high(8'd0), .corrected(unused)
+                .data(value), .given(7'd0), .check(check), .corrected(unused[33:2]), .wrong(unused[1:0])
             );
             assign stored = {check, value};
         end

@@ -29,19 +29,20 @@ module takt_ecc_program #(
     output wire               scrub_two_wrong
 );
 
-    localparam BITS = 48 - LOW;
+    localparam BITS  = 48 - LOW;
+    localparam CHECK = 8;
 
     (* no_rw_check *)
-    reg [BITS+6:0] words [0:DEPTH-1];
-    reg [BITS+6:0] kept, seen;
-    integer        i;
+    reg [CHECK+BITS-1:0] words [0:DEPTH-1];
+    reg [CHECK+BITS-1:0] kept, seen;
+    integer              i;
     initial for (i = 0; i < DEPTH; i = i + 1) words[i] = 0;  // a valid word
 
     wire               legal   = ~|(write_word & ((48'd1 << LOW) - 48'd1));
     wire [BITS-1:0]    stored  = write_word[47:LOW] & {BITS{legal}};
     wire [ADDRESS-1:0] address = write ? write_address : scrub_address;
-    wire [6:0]         stored_check, kept_syndrome, next_syndrome, unused_check1, unused_check2;
-    wire [BITS-1:0]    unused_corrected1, unused_corrected2, unused_corrected3;
+    wire [CHECK-1:0]   stored_check, kept_syndrome, next_syndrome, unused_check1, unused_check2;
+    wire [BITS+1:0]    unused1, unused2, unused3;
 
     always @(posedge clk) begin
         if (write) words[address] <= {stored_check, stored};
@@ -49,16 +50,14 @@ module takt_ecc_program #(
         if (read) kept <= words[read_address];
     end
 
-    takt_ecc_code #(.BITS(BITS)) encodes (
-        .data(stored), .given(7'd0), .check(stored_check), .low(16'd0), .high(8'd0), .corrected(unused_corrected1)
+    takt_ecc_code #(.BITS(BITS), .CHECK(CHECK)) encodes (
+        .data(stored), .given({CHECK{1'b0}}), .check(stored_check), .corrected(unused1[BITS+1:2]), .wrong(unused1[1:0])
     );
     // The way from the block RAM takes half a cycle: the word is corrected in the decode stage. `checks` stays apart, so that synthesis,
     // which does not count that half, gives it the least depth.
-    reg  [BITS-1:0] raw;
-    reg  [6:0]      syndrome;
-    wire [BITS-1:0] decoded;
-    wire [15:0]     low, scrub_low;
-    wire [7:0]      high, scrub_high;
+    reg  [BITS-1:0]  raw;
+    reg  [CHECK-1:0] syndrome;
+    wire [BITS-1:0]  decoded;
     always @(posedge clk) begin
         if (advance) begin
             raw      <= kept[BITS-1:0];
@@ -66,27 +65,22 @@ module takt_ecc_program #(
         end
     end
     (* keep_hierarchy = "yes" *)
-    takt_ecc_code #(.BITS(BITS)) checks (
-        .data(kept[BITS-1:0]), .given(kept[BITS+6:BITS]), .check(kept_syndrome), .low(16'd0), .high(8'd0), .corrected(unused_corrected2)
+    takt_ecc_code #(.BITS(BITS), .CHECK(CHECK)) checks (
+        .data(kept[BITS-1:0]), .given(kept[BITS +: CHECK]), .check(kept_syndrome), .corrected(unused2[BITS+1:2]), .wrong(unused2[1:0])
     );
-    takt_ecc_place place (
-        .syndrome(syndrome), .low(low), .high(high), .one_wrong(one_wrong), .two_wrong(two_wrong)
-    );
-    takt_ecc_code #(.BITS(BITS), .CORRECTS(1)) corrects (
-        .data(raw), .given(7'd0), .check(unused_check1), .low(low), .high(high), .corrected(decoded)
+    takt_ecc_code #(.BITS(BITS), .CHECK(CHECK), .CORRECTS(1)) corrects (
+        .data(raw), .given(syndrome), .check(unused_check1), .corrected(decoded), .wrong({two_wrong, one_wrong})
     );
 
-    reg  [6:0]      seen_syndrome;
-    wire [BITS-1:0] repaired;
+    reg  [CHECK-1:0] seen_syndrome;
+    wire [BITS-1:0]  repaired;
     always @(posedge clk) seen_syndrome <= next_syndrome;
-    takt_ecc_place scrub_place (
-        .syndrome(seen_syndrome), .low(scrub_low), .high(scrub_high), .one_wrong(scrub_one_wrong), .two_wrong(scrub_two_wrong)
+    takt_ecc_code #(.BITS(BITS), .CHECK(CHECK)) scrubs (
+        .data(seen[BITS-1:0]), .given(seen[BITS +: CHECK]), .check(next_syndrome), .corrected(unused3[BITS+1:2]), .wrong(unused3[1:0])
     );
-    takt_ecc_code #(.BITS(BITS)) scrubs (
-        .data(seen[BITS-1:0]), .given(seen[BITS+6:BITS]), .check(next_syndrome), .low(16'd0), .high(8'd0), .corrected(unused_corrected3)
-    );
-    takt_ecc_code #(.BITS(BITS), .CORRECTS(1)) repairs (
-        .data(seen[BITS-1:0]), .given(7'd0), .check(unused_check2), .low(scrub_low), .high(scrub_high), .corrected(repaired)
+    takt_ecc_code #(.BITS(BITS), .CHECK(CHECK), .CORRECTS(1)) repairs (
+        .data(seen[BITS-1:0]), .given(seen_syndrome), .check(unused_check2), .corrected(repaired),
+        .wrong({scrub_two_wrong, scrub_one_wrong})
     );
 
     generate

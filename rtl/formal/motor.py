@@ -16,13 +16,13 @@ from solve import remember
 
 # Modules by name, with their folders.
 MODULES = {name: FORMAL.parent / "board" / "verilog" for name in ("takt_pwm_phase", "takt_pwm3", "takt_trip", "takt_filter")}
-MODULES |= {name: FORMAL.parent / "ecc" for name in ("takt_ecc_code", "takt_ecc_place")}
+MODULES["takt_ecc_code"] = FORMAL.parent / "ecc"
 # Half a carrier's period, dead time, least time; mutants are tried with the last.
 PHASES = [(1250, 0, 0), (60, 1, 7), (65535, 1023, 1023), (1250, 25, 50)]
 # Filter, dead time, level while tripped, direct or not; mutants are tried with the last two.
 TRIPS = [(0, 2, 1, 0), (1, 0, 0, 0), (0, 0, 2, 1), (5, 3, 2, 0), (0, 3, 1, 1)]
 # Bits of a word: of a program with no bit left out, of data; mutants are tried with the last. A shorter word is one whose other bits are 0.
-CODES = [(48,), (32,)]
+CODES = [(48, 8), (32, 7)]  # bits of a word of program and of data, check bits
 # Statement of each proof, for people.
 SHOWN = {
     "phase": "two switches of a half bridge are never on together, dead time and least times hold",
@@ -63,14 +63,14 @@ TRIP_MUTANTS = [
     ("takt_filter", "rst | held == LAST[BITS-1:0]", "rst"),
 ]
 CODE_MUTANTS = [
-    ("takt_ecc_code", "found == ones", "found == ones - 1"),
-    ("takt_ecc_code", "ones = 3", "ones = 1"),
+    ("takt_ecc_code", "found == 3", "found == 2"),
+    ("takt_ecc_code", "count < bits && found == 3", "count < bits"),
+    ("takt_ecc_code", "] = value[k]", "] = value[k] & k != 2"),
     ("takt_ecc_code", "^{taken, given[k]}", "^taken"),
-    ("takt_ecc_code", "low[COLUMN[3:0]] & high[COLUMN[6:4]]", "low[COLUMN[3:0]]"),
-    ("takt_ecc_code", "low[COLUMN[3:0]] & high[COLUMN[6:4]]", "high[COLUMN[6:4]]"),
-    ("takt_ecc_place", "syndrome[6:4]", "syndrome[5:3]"),
-    ("takt_ecc_place", "^syndrome", "^syndrome[5:0]"),
-    ("takt_ecc_place", "& ~one_wrong", ""),
+    ("takt_ecc_code", "&(given | ~COLUMNS[CHECK*i +: CHECK])", "|(given & COLUMNS[CHECK*i +: CHECK])"),
+    ("takt_ecc_code", "~COLUMNS[CHECK*i +: CHECK]", "{1'b1, ~COLUMNS[CHECK*i +: CHECK-1]}"),
+    ("takt_ecc_code", "|given & ~^given", "|given"),
+    ("takt_ecc_code", ", ^given}", ", ^given[CHECK-2:0]}"),
 ]
 
 
@@ -145,10 +145,10 @@ def trip(folder, setting, mutant=None, certifier=None):
 
 
 def code(folder, setting, mutant=None, certifier=None):
-    """Shows that the properties of `code.v` hold of a word of so many bits."""
+    """Shows that the properties of `code.v` hold of a word of so many bits with so many check bits."""
     found = texts(mutant)
-    files = {name: found[name] for name in ("takt_ecc_code", "takt_ecc_place")} | {"takt_code": (FORMAL / "code.v").read_text()}
-    return proved(folder, files, "takt_code", {"BITS": setting[0]}, 1, certifier)
+    files = {"takt_ecc_code": found["takt_ecc_code"], "takt_code": (FORMAL / "code.v").read_text()}
+    return proved(folder, files, "takt_code", dict(zip(("BITS", "CHECK"), setting)), 1, certifier)
 
 
 def refuted(prove, folder, settings, mutant):

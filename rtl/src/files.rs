@@ -74,7 +74,6 @@ pub(crate) const PAIR: &[File] = files!("pair":
 #[rustfmt::skip]
 pub(crate) const ECC: &[File] = files!("ecc":
     "takt_ecc_code.v"
-    "takt_ecc_place.v"
     "takt_ecc_program.v"
     "takt_ecc_report.v"
     "takt_ecc_scrub.v"

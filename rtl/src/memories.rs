@@ -5,8 +5,10 @@ use crate::circuit::{Circuit, Library};
 use crate::plan::Plan;
 use takt_isa::memory::{BlockRam, Shape};
 
-/// Check bits of a word with error correction (`ecc/takt_ecc_code.v`); a bank's parities are in bits that a block RAM has beside 32.
-const CHECK_BITS: u64 = 7;
+/// Check bits of a word of program and of data with error correction (`ecc/takt_ecc_code.v`); a bank's parities are in bits that a
+/// block RAM has beside 32.
+const PROGRAM_CHECK_BITS: u64 = 8;
+const DATA_CHECK_BITS: u64 = 7;
 
 /// Block RAMs of a core.
 pub fn block_rams(plan: &Plan, library: &Library, block: &BlockRam) -> u64 {
@@ -15,9 +17,10 @@ pub fn block_rams(plan: &Plan, library: &Library, block: &BlockRam) -> u64 {
     let banks = machine.banks().map(|bank| Shape { words: bank.depth.into(), bits: 32 });
     let sources = plan.sources().count() as u64;
     let tables = plan.slots.iter().flat_map(|slot| &slot.circuits);
-    let check = if plan.ecc { CHECK_BITS } else { 0 };
-    let words = machine.code_memories().chain([machine.data_memory()]);
-    let words = words.map(|memory| Shape { bits: memory.bits + check, ..memory });
+    let coded =
+        |memory: Shape, check: u64| Shape { bits: memory.bits + if plan.ecc { check } else { 0 }, ..memory };
+    let program = machine.code_memories().map(|memory| coded(memory, PROGRAM_CHECK_BITS));
+    let words = program.chain([coded(machine.data_memory(), DATA_CHECK_BITS)]);
     words.map(|memory| block.blocks(memory)).sum::<u64>()
         + sources * banks.map(|bank| block.blocks(bank)).sum::<u64>()
         + tables.flat_map(|circuit| tables_of(circuit, library)).map(|table| block.blocks(table)).sum::<u64>()

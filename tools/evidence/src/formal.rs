@@ -89,8 +89,8 @@ pub(crate) fn unit_share() -> Result<()> {
 
 /// Inputs of the cores' proofs: circuits, planted faults, proof scripts, tools.
 pub(crate) fn core_inputs() -> Result<Inputs> {
-    let library = Library::load(&root().join("rtl/units"))?;
-    let python = [
+    let library = units_library()?;
+    let scripts = [
         "balance.py",
         "bank.v",
         "circuit.py",
@@ -100,7 +100,7 @@ pub(crate) fn core_inputs() -> Result<Inputs> {
         "unrolled.py",
         "word.v",
     ];
-    let own = files("rtl/formal", &python, Inputs::default())?
+    let own = files("rtl/formal", &scripts, Inputs::default())?
         .and((include_str!("formal.rs"), YOSYS, SAT))
         .files("tools/evidence/src/formal/core")?
         .files("rtl/formal/fresh.json")?
@@ -118,7 +118,7 @@ pub(crate) fn core_inputs() -> Result<Inputs> {
 /// Inputs of the proofs of half bridges, trips and the code of memory words.
 pub(crate) fn bridge_inputs() -> Result<Inputs> {
     let own = Inputs::default().and((include_str!("formal.rs"), YOSYS, SAT));
-    let python = [
+    let scripts = [
         "motor.py",
         "phase.v",
         "trip.v",
@@ -130,10 +130,10 @@ pub(crate) fn bridge_inputs() -> Result<Inputs> {
         "solve.py",
         "unrolled.py",
     ];
-    let own = files("rtl/formal", &python, own)?;
+    let own = files("rtl/formal", &scripts, own)?;
     let circuits = ["takt_pwm_phase.v", "takt_pwm3.v", "takt_trip.v", "takt_filter.v"];
     let own = files("rtl/board/verilog", &circuits, own)?;
-    files("rtl/ecc", &["takt_ecc_code.v", "takt_ecc_place.v"], own)
+    files("rtl/ecc", &["takt_ecc_code.v"], own)
 }
 
 /// Adds files of a folder.
@@ -141,23 +141,33 @@ fn files(folder: &str, names: &[&str], inputs: Inputs) -> Result<Inputs> {
     names.iter().try_fold(inputs, |inputs, name| inputs.files(&format!("{folder}/{name}")))
 }
 
+/// Environment of the scripts, with yosys and solvers.
+fn python() -> Result<Venv> {
+    Venv::with(&[YOSYS, SAT])
+}
+
+/// Circuits of the units.
+fn units_library() -> Result<Library> {
+    Ok(Library::load(&root().join("rtl/units"))?)
+}
+
 /// Runs the cores' proofs of the test suite: t1 with planted faults and with latched ports, and banks.
 pub(crate) fn core_share() -> Result<()> {
-    let (venv, library) = (Venv::with(&[YOSYS, SAT])?, Library::load(&root().join("rtl/units"))?);
+    let (venv, library) = (python()?, units_library()?);
     core(&venv, &library, &T1, &Arguments::SHARE)?;
     banks(&venv, &library)
 }
 
 /// Runs the proof of every core, without planted faults.
 pub(crate) fn cores() -> Result<()> {
-    let (venv, library) = (Venv::with(&[YOSYS, SAT])?, Library::load(&root().join("rtl/units"))?);
+    let (venv, library) = (python()?, units_library()?);
     let all = Arguments { mutants: None, ..Arguments::SHARE };
     MACHINES.iter().try_for_each(|machine| core(&venv, &library, machine, &all))
 }
 
 /// Runs the proofs of half bridges, trips and the code of memory words.
 pub(crate) fn bridges() -> Result<()> {
-    motor(&Venv::with(&[YOSYS, SAT])?, &Arguments::SHARE)
+    motor(&python()?, &Arguments::SHARE)
 }
 
 /// Entry of `cargo evidence formal`.
@@ -165,11 +175,11 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
     if let Some(names) = &arguments.units {
         return units::prove(arguments, names, false);
     }
-    let venv = Venv::with(&[YOSYS, SAT])?;
+    let venv = python()?;
     if arguments.bridges {
         return motor(&venv, arguments);
     }
-    let library = Library::load(&root().join("rtl/units"))?;
+    let library = units_library()?;
     let machines = match &arguments.machine {
         Some(name) => vec![machine::machine(name).map_err(anyhow::Error::msg)?],
         None => MACHINES.to_vec(),
