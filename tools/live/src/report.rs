@@ -157,3 +157,36 @@ pub fn depth(application: &Application<'_>, fifo: &Fifo) -> u32 {
         _ => 0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corrections_are_shown_where_there_are_any() {
+        let core = |corrections| CoreReport {
+            name: String::new(),
+            periods: 9,
+            misses: 0,
+            cycles: 40,
+            most_cycles: 50,
+            halted: false,
+            corrections,
+            fault: None,
+        };
+        let mut report = Report {
+            state: "the program runs".to_owned(),
+            runs: true,
+            held: false,
+            safe: Vec::new(),
+            trips: Vec::new(),
+            cores: vec![core(0)],
+            fifos: Vec::new(),
+            errors: 0,
+            lost: 0,
+        };
+        assert!(!report.to_string().contains("corrections"), "{report}");
+        report.cores = vec![core(3)];
+        assert!(report.to_string().contains("most_cycles 50, corrections 3\n"), "{report}");
+    }
+}

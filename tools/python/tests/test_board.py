@@ -160,9 +160,11 @@ def test_a_program_is_loaded_and_compared(fake):
     # An answer is found even after noise.
     simulated.noise = b"\x00\x5a\x01\xff\xa5"
     assert board.status.state == "stopped"
-    simulated.words |= {STATUS: 4 | 3 << 12, 3: 2 << 16 | 17}
+    assert board.status.corrections == 0
+    simulated.words |= {STATUS: 4 | 3 << 12 | 255 << 24, 3: 2 << 16 | 17}
     status = board.status
     assert (status.state, status.causes, status.fault) == ("stopped with a fault", ("fault", "halt"), (17, "data address"))
+    assert status.corrections == 255
 
 
 def test_a_stream_has_periods_and_values(fake):
