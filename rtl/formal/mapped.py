@@ -81,8 +81,8 @@ class Logic:
         """The inputs on which literals depend."""
         return [2 * variable for variable in self.cone(literals) if isinstance(self.nodes[variable], str)]
 
-    def simulate(self, bits):
-        """Random values of all variables, as words of so many bits."""
+    def simulate(self, bits, zero=()):
+        """Random values of all variables, as words of so many bits; some inputs are 0."""
         chance, ones = random.Random(1), (1 << bits) - 1
         values = [0]
         for node in self.nodes[1:]:
@@ -90,8 +90,21 @@ class Logic:
                 left, right = (values[literal >> 1] ^ -(literal & 1) & ones for literal in node)
                 values.append(left & right)
             else:
-                values.append(chance.getrandbits(bits))
+                values.append(0 if 2 * len(values) in zero else chance.getrandbits(bits))
         return lambda literal: values[literal >> 1] ^ -(literal & 1) & ones
+
+    def cofactors(self, literal, of, value):
+        """Values of a literal where an input is 0, and where it is 1; `value` is a simulation's."""
+        found = []
+        for constant in (FALSE, TRUE):
+            new = {of >> 1: value(constant)}
+            word = lambda literal: new.get(literal >> 1, value(literal & ~1)) ^ (value(TRUE) if literal & 1 else 0)
+            for variable in self.cone([literal]):
+                node = self.nodes[variable]
+                if isinstance(node, tuple):
+                    new[variable] = word(node[0]) & word(node[1])
+            found.append(word(literal))
+        return tuple(found)
 
     def replaced(self, literal, by):
         """A literal with inputs replaced by other literals."""
@@ -309,7 +322,8 @@ class Comparison:
 
     def proposed(self):
         """Counterparts of registers without one, by simulation: a constant that the register seems to keep, or a mapped register, or its
-        negation, whose next state seems to be the same. The proof decides. True if any was found."""
+        negation, whose next state seems to be the same; failing that, seems to be the same where all others without a counterpart are 0,
+        and the register itself 0, or 1. The proof decides. True if any was found."""
         kept = lambda own, constant: lambda literal: constant if literal == own else literal
         for net, own in self.missing.items():
             next_state = self.before[0](self.source.registers[net])
@@ -322,7 +336,18 @@ class Comparison:
         for state, next_state in self.next_states.items():
             for negated in (0, 1):
                 alike[value(next_state ^ negated)].append(state ^ negated)
-        candidates = {net: alike[value(self.before[0](self.source.registers[net]))] for net in self.missing.keys() - self.counterparts.keys()}
+        candidates = {}
+        for net in self.missing.keys() - self.counterparts.keys():
+            candidates[net] = alike[value(self.before[0](self.source.registers[net]))]
+        lonely = {net: self.missing[net] for net, states in candidates.items() if not states}
+        free = set(self.states.values()) - {literal & ~1 for literal in self.counterparts.values()}
+        if lonely and free:
+            value = self.logic.simulate(PATTERNS, free | set(lonely.values()))
+            alike = defaultdict(list)
+            for state in free:
+                alike[self.logic.cofactors(self.next_states[state], state, value)].append(state)
+            for net, own in lonely.items():
+                candidates[net] = alike[self.logic.cofactors(self.before[0](self.source.registers[net]), own, value)]
         # Mapped registers with the same next state may differ in the first cycle: the one that is read in the same places is meant.
         read, used = self.read_together(candidates), set(self.counterparts.values())
         for net, states in candidates.items():
@@ -378,6 +403,15 @@ class Comparison:
             wrong = [self.logic.differ(before(net), literal) for before in self.before]
             found[kind, name][bit] = self.logic.both(*wrong)
         return found
+
+    def flip_flops(self):
+        """Which registers of the Verilog are one in the mapped netlist, and which are none: all names of each, with the numbers of bits."""
+        text = lambda net: " ".join(sorted(f"{name}[{i}]" for name, i in self.source.names[net] if not name.startswith("$")))
+        of = defaultdict(list)
+        for net, counterpart in self.counterparts.items():
+            of[counterpart & ~1].append(text(net))
+        none = of.pop(FALSE, []) + [text(net) for net in self.missing]
+        return {"one": sorted(sorted(names) for names in of.values() if len(names) > 1), "none": sorted(none)}
 
     def unread(self, differences):
         """Registers without counterpart; none may be read."""
@@ -589,6 +623,7 @@ def main():
     parser.add_argument("--clocked", nargs="*", default=[], metavar="CELL[.PIN]", help="cells or pins that are cut out and sampled by the clock")
     parser.add_argument("--certify", metavar="CHECKER", help=solve.CERTIFY)
     parser.add_argument("--mutants", type=int, default=0, help="faults to plant of each kind")
+    parser.add_argument("--flip-flops", action="store_true", help="write down which registers are one in the mapped netlist, or none")
     parser.add_argument("--record", action="store_true")
     parser.add_argument("--verbose", action="store_true")
     arguments = parser.parse_args()
@@ -598,6 +633,8 @@ def main():
         comparison = Comparison(source, mapped, clocked)
         figures = prove(comparison, solve.certifier(arguments.folder, arguments.certify), name)
         figures["cut"] = cut_out(source)
+        if arguments.flip_flops:
+            figures["flip_flops"] = comparison.flip_flops()
         print(
             "{}: equal: next states of {registers} registers ({mapped} mapped: {merged} merged with others, {constant} constant, {unread} read "
             "by nothing), {outputs} output bits, {pins} inputs of cells cut out; {structure} bits by structure, the others by {proofs} proofs, "

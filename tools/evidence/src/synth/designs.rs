@@ -65,11 +65,7 @@ fn core(
     Ok(Design {
         // Record only machines of the table or of this repository, with their original memory sizes; others belong to their authors.
         recorded: machine == machine.row() && (machine.is_builtin() || own.is_some()),
-        name: own.unwrap_or_else(|| machine.name.to_owned())
-            + if safety.ecc { " with error correction" } else { "" }
-            + &safety
-                .second_core
-                .map_or_else(String::new, |delay| format!(" and a second core, {delay} cycles later")),
+        name: own.unwrap_or_else(|| machine.name.to_owned()) + &safety.text(),
         files,
         top,
         mapping: Mapping::of(machine),
