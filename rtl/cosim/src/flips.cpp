@@ -7,7 +7,7 @@
 // stdin, words of 32 bits, little-endian:
 //   records count, then (space, slot, address, low, high) each; inputs count, their numbers; outputs count, their numbers, and for each
 //   whether it is a float; cycles of a period; periods; a row of inputs for each period; horizon in periods;
-//   after the answer, for each flip: register, cycle, count of bits, bits; or ffffffff to end
+//   after the answer, for each flip: cycle, count of bits, and for each its register and its number; or ffffffff to end
 // stdout:
 //   count of registers, then for each bits, words of a memory (0: flip-flops), length of the name, the name a character a word;
 //   first and last cycle for a flip; then for each flip: cycle of the first difference of what leaves the (first) core, cycle of `differs` or
@@ -307,15 +307,17 @@ int main(int argc, char **argv) {
     put(last);
     fflush(stdout);
 
-    for (uint32_t index; (index = need()) != 0xffffffff;) {
-        const Register &own = registers.at(index);
-        size_t from = need();
-        std::vector<uint32_t> bits = need(need());
+    for (uint32_t from; (from = need()) != 0xffffffff;) {
+        std::vector<uint32_t> bits = need(2 * size_t(need()));
         restore(states[from / STEP]);
         for (size_t cycle = from / STEP * STEP; cycle < from; cycle++) pass();
-        for (size_t bit : bits) own.data[bit / own.bits * own.entry + bit % own.bits / 8] ^= 1 << bit % own.bits % 8;
+        for (size_t i = 0; i < bits.size(); i += 2) {
+            const Register &own = registers.at(bits[i]);
+            size_t bit = bits[i + 1];
+            own.data[bit / own.bits * own.entry + bit % own.bits / 8] ^= 1 << bit % own.bits % 8;
+        }
         uint32_t harmful = 0, told = 0, stops = 0, same = 0, corrected = 0;
-        size_t end = from + size_t(horizon) * period;
+        size_t end = size_t(from) + size_t(horizon) * period;
         for (size_t cycle = from; cycle < end; cycle++) {
             if (cycle > from && cycle % STEP == 0) {
                 const State &state = states[cycle / STEP];

@@ -151,12 +151,13 @@ impl FlipModel {
 }
 
 impl Flips {
-    /// Flips bits of a register, by its number, at the beginning of a cycle.
+    /// Flips bits at once, at the beginning of a cycle: each is a bit of a register, by the register's number.
     ///
     /// # Errors
     /// If the process has ended.
-    pub fn flip(&mut self, register: usize, bits: &[u32], cycle: u32) -> Result<Outcome, ModelError> {
-        let words = [&[register as u32, cycle, bits.len() as u32], bits].concat();
+    pub fn flip(&mut self, bits: &[(usize, u32)], cycle: u32) -> Result<Outcome, ModelError> {
+        let mut words = vec![cycle, bits.len() as u32];
+        words.extend(bits.iter().flat_map(|&(register, bit)| [register as u32, bit]));
         self.process.send(&words)?;
         let words = self.process.receive(5)?;
         let cycle = |word: u32| word.checked_sub(1);

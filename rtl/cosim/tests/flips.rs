@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Flips of every flip-flop of the first core of a pair of t1, and of a sample of its other bits: the second core tells of every harmful one.
+//! Flips of every flip-flop of the first core of a pair of t1, as it is after synthesis, and of a sample of its other bits: the second core
+//! tells of every harmful one.
 //! Flips in memories with error correction: none is harmful, or it is told.
 #![allow(clippy::print_stdout)]
 
@@ -8,7 +9,8 @@ use crate::ecc;
 use crate::pair::{DELAY, pair};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
-use std::collections::BTreeMap;
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
 use takt_asm::{MemoryLoader, Options, Search};
 use takt_cosim::flips::{FlipModel, FlipRegister, Outcome, Stimulus};
 use takt_isa::{Program, T1, Type};
@@ -104,13 +106,15 @@ fn build(design: &Design) -> FlipModel {
     FlipModel::build(design, &folder()).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// Core that a register belongs to, the first or the second; neither for what compares them.
+fn core_of(register: &FlipRegister) -> Option<&str> {
+    register.name.split('.').next().filter(|core| ["first", "second"].contains(core))
+}
+
 /// Structure that a register belongs to: the core or what compares, and of a core its part.
 fn structure(register: &FlipRegister) -> String {
-    let Some((core, rest)) =
-        register.name.split_once('.').filter(|(core, _)| ["first", "second"].contains(core))
-    else {
-        return "comparison".to_owned();
-    };
+    let Some(core) = core_of(register) else { return "comparison".to_owned() };
+    let rest = &register.name[core.len() + 1..];
     let part = match rest.split_once('.').map(|(part, _)| part) {
         _ if register.words > 0 => match rest {
             rest if rest.contains("program") => "memory_program",
@@ -133,6 +137,44 @@ fn structure(register: &FlipRegister) -> String {
         Some(other) => panic!("`{other}` of the core belongs to no structure"),
     };
     format!("{core}.{part}")
+}
+
+/// A bit of a register, by the register's number.
+type Bit = (usize, u32);
+
+/// Flip-flops of the mapped netlist, each as the bits of the Verilog's registers that it is: one as a rule. `cargo evidence netlist --prove
+/// --machine t1 --second-core` proves that they are, and that a flip of a flip-flop is a flip of these bits: the netlists are equal from any
+/// state in which registers have the values of their flip-flops.
+fn flip_flops(registers: &[FlipRegister]) -> Vec<Vec<Bit>> {
+    let results: Value = serde_json::from_str(include_str!("../../formal/results.json")).expect("JSON");
+    let design = format!("t1{}", pair(&T1, 0).safety.text());
+    let known = &results["mapped"][&design]["flip_flops"];
+    let numbers: BTreeMap<&str, usize> =
+        registers.iter().enumerate().map(|(i, register)| (register.name.as_str(), i)).collect();
+    // A wire that joins a register to others has names of its own.
+    let bit = |names: &Value| -> Bit {
+        let names = names.as_str().expect("names");
+        let mut found = names.split(' ').filter_map(|text| {
+            let (name, bit) = text.strip_suffix(']')?.rsplit_once('[')?;
+            Some((*numbers.get(name)?, bit.parse().ok()?))
+        });
+        found.next().unwrap_or_else(|| panic!("`{names}` is no register: the proof is of another circuit"))
+    };
+    let list = |names: &Value| names.as_array().expect("a list").iter().map(bit).collect::<Vec<_>>();
+    let none: BTreeSet<Bit> = list(&known["none"]).into_iter().collect();
+    let several: Vec<Vec<Bit>> = known["one"].as_array().expect("a list").iter().map(list).collect();
+    let further: BTreeSet<Bit> = several.iter().flat_map(|bits| &bits[1..]).copied().collect();
+    let together: BTreeMap<Bit, &Vec<Bit>> = several.iter().map(|bits| (bits[0], bits)).collect();
+    for bits in &several {
+        let of = |&(register, _): &Bit| core_of(&registers[register]);
+        assert!(bits.iter().all(|bit| of(bit) == of(&bits[0])), "a flip-flop is shared: {bits:?}");
+    }
+    let of_flip_flops = registers.iter().enumerate().filter(|(_, register)| register.words == 0);
+    of_flip_flops
+        .flat_map(|(i, register)| (0..register.count()).map(move |bit| (i, bit)))
+        .filter(|bit| !none.contains(bit) && !further.contains(bit))
+        .map(|bit| together.get(&bit).map_or_else(|| vec![bit], |bits| bits.to_vec()))
+        .collect()
 }
 
 /// Counts by structure and outcome.
@@ -183,35 +225,33 @@ fn run(case: &Case, model: &FlipModel, (first, flips): (u64, u64), only: &str) -
     let (mut counts, mut late) = (Counts::default(), Vec::new());
     let mut simulation =
         model.start(&case.program, &case.stimulus).unwrap_or_else(|error| panic!("{}: {error}", case.name));
-    let of = |of_memory: bool| {
-        let all = simulation.registers.iter().enumerate();
-        all.filter(move |(_, own)| (own.words > 0) == of_memory && own.name.starts_with(only))
-    };
-    let bits = |chosen: &dyn Fn(&str) -> bool| -> Vec<(usize, u32)> {
-        let own = of(false).filter(|(_, own)| chosen(&own.name));
-        own.flat_map(|(i, own)| (0..own.count()).map(move |bit| (i, bit))).collect()
-    };
-    let is_first = |name: &str| name.starts_with("first.");
-    let (first_core, others) = (bits(&is_first), bits(&|name| !is_first(name)));
+    let registers = &simulation.registers;
+    let is_chosen = |register: usize| registers[register].name.starts_with(only);
+    let (first_core, others): (Vec<_>, Vec<_>) = flip_flops(registers)
+        .into_iter()
+        .filter(|bits| is_chosen(bits[0].0))
+        .partition(|bits| core_of(&registers[bits[0].0]) == Some("first"));
     // Small memories are met as often as large ones.
-    let memories: Vec<(usize, u32)> = of(true).map(|(i, own)| (i, own.count())).collect();
+    let memories = registers.iter().enumerate().filter(|&(i, own)| own.words > 0 && is_chosen(i));
+    let memories: Vec<Bit> = memories.map(|(i, own)| (i, own.count())).collect();
     let (first_bits, other_bits, memory_count) = (first_core.len(), others.len(), memories.len());
     println!("figures: circuit={first_bits}-and-{other_bits}-flip-flops,{memory_count}-memories");
     let mut random = Pcg64Mcg::seed_from_u64(first);
     let (begin, end) = simulation.cycles;
     for number in first..first + flips {
-        let by_turns = |all: &[(usize, u32)]| all[(number * STRIDE) as usize % all.len()];
+        let by_turns = |all: &[Vec<Bit>]| all[(number * STRIDE) as usize % all.len()].clone();
         let draw = random.next_u32();
-        let (register, bit) = if draw % MEMORY == 0 || first_core.is_empty() {
+        let bits = if draw % MEMORY == 0 || first_core.is_empty() {
             let (register, bits) = memories[random.next_u32() as usize % memories.len()];
-            (register, random.next_u32() % bits)
+            vec![(register, random.next_u32() % bits)]
         } else if (draw / MEMORY).is_multiple_of(OTHERS) {
             by_turns(&others)
         } else {
             by_turns(&first_core)
         };
         let cycle = begin + random.next_u32() % (end - begin);
-        let outcome = simulation.flip(register, &[bit], cycle).unwrap_or_else(|error| panic!("{error}"));
+        let outcome = simulation.flip(&bits, cycle).unwrap_or_else(|error| panic!("{error}"));
+        let (register, bit) = bits[0];
         let of = structure(&simulation.registers[register]);
         assert!(!of.starts_with("second") || outcome.harmful.is_none(), "{of}: {outcome:?}");
         if outcome.harmful.is_some_and(|wrong| outcome.told.is_none_or(|told| told > wrong + TOLD)) {
@@ -294,15 +334,17 @@ fn run_coded(case: &Case, model: &FlipModel, first: u64, flips: u64, bits: usize
         let word = random.next_u32() % own.words;
         let one = random.next_u32() % own.bits;
         let other = (one + 1 + random.next_u32() % (own.bits - 1)) % own.bits;
-        let flipped: Vec<u32> = [one, other].iter().take(bits).map(|bit| word * own.bits + bit).collect();
+        let flipped: Vec<(usize, u32)> =
+            [one, other].iter().take(bits).map(|bit| (*register, word * own.bits + bit)).collect();
         let cycle = begin + random.next_u32() % (end - begin);
-        let outcome = simulation.flip(*register, &flipped, cycle).unwrap_or_else(|error| panic!("{error}"));
+        let outcome = simulation.flip(&flipped, cycle).unwrap_or_else(|error| panic!("{error}"));
         let structure = named(own);
         let of = structure.trim_start_matches("first.");
         let in_time =
             outcome.harmful.is_none_or(|wrong| outcome.told.is_some_and(|told| told <= wrong + TOLD));
         let place = || {
-            format!("{}: bits {flipped:?} of {}, flipped in cycle {cycle}: {outcome:?}", case.name, own.name)
+            let bits = flipped.iter().map(|(_, bit)| bit).collect::<Vec<_>>();
+            format!("{}: bits {bits:?} of {}, flipped in cycle {cycle}: {outcome:?}", case.name, own.name)
         };
         // Two wrong bits of a byte have the right parity.
         let is_hidden = bits == 2 && of == "memory_registers";
