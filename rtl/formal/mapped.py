@@ -411,6 +411,8 @@ class Comparison:
         for net, counterpart in self.counterparts.items():
             of[counterpart & ~1].append(text(net))
         none = of.pop(FALSE, []) + [text(net) for net in self.missing]
+        if of.keys() != set(self.states.values()):
+            raise Failure("not every flip-flop is a register of the Verilog, or not every register a flip-flop")
         return {"one": sorted(sorted(names) for names in of.values() if len(names) > 1), "none": sorted(none)}
 
     def unread(self, differences):
