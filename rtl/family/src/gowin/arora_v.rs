@@ -21,7 +21,10 @@ pub static FAMILY: Family = Family {
     }),
     cells: Cells { multipliers: &[("MULTALU27X18", 1), ("MULT27X36", 2)], ..CELLS },
     pll: Some(Pll { instance: pll::arora_v, stand_in: ("PLLA.v", include_str!("PLLA.v")) }),
-    synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw5a", top, netlist), files: FILES }),
+    synthesis: Some(Synthesis {
+        commands: |top, netlist, _| commands("gw5a", "_gw5a", top, netlist),
+        files: FILES,
+    }),
     place: Some(Place {
         device: |part, package, grade| device(part, package, grade, "sspi_as_gpio"),
         // The margin holds here, too: Project Apicula's database has the delays of GW2A in place of this family's own.

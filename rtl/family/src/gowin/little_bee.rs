@@ -17,7 +17,10 @@ pub static FAMILY: Family = Family {
         instance: "OSC #(.FREQ_DIV(26), .DEVICE(\"GW1NR-9\")) oscillator (.OSCOUT(oscillation));",
     }),
     pll: Some(Pll { instance: pll::gw1n, stand_in: ("rPLL.v", include_str!("rPLL.v")) }),
-    synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw1n", top, netlist), files: FILES }),
+    synthesis: Some(Synthesis {
+        commands: |top, netlist, _| commands("gw1n", "", top, netlist),
+        files: FILES,
+    }),
     place: Some(Place {
         device: |part, package, grade| device(part, package, grade, &format!("family={DIE}")),
         measured: &MEASURED,

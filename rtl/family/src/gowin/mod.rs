@@ -44,7 +44,10 @@ const GW2A: Family = Family {
     flash_clock: None,
     cells: CELLS,
     pll: Some(Pll { instance: pll::gw2a, stand_in: ("rPLL.v", include_str!("rPLL.v")) }),
-    synthesis: Some(Synthesis { commands: |top, netlist, _| commands("gw2a", top, netlist), files: FILES }),
+    synthesis: Some(Synthesis {
+        commands: |top, netlist, _| commands("gw2a", "", top, netlist),
+        files: FILES,
+    }),
     place: Some(PLACE),
     pack: Some(PACK),
     models: MODELS.if_wanted(),
@@ -55,12 +58,12 @@ const GW2A: Family = Family {
 
 const ROOM: Option<crate::Resources> = room(20_736, 15_552, 48, 46);
 
-/// `synth_gowin` for a family, with block RAMs of two ports only.
-fn commands(family: &str, top: &str, netlist: &str) -> String {
+/// `synth_gowin` for a family, with block RAMs of two ports only; yosys' map of them has a name for some families.
+fn commands(family: &str, map: &str, top: &str, netlist: &str) -> String {
     let synthesis = |run: &str| format!("synth_gowin -family {family} -top {top} {run}");
     format!(
         "{}; memory_libmap -D {family} -lib +/gowin/lutrams.txt -lib {BLOCK_RAM_FILE}; \
-         techmap -map +/gowin/lutrams_map.v -map +/gowin/brams_map.v; {}",
+         techmap -map +/gowin/lutrams_map.v -map +/gowin/brams_map{map}.v; {}",
         synthesis("-run begin:map_ram"),
         synthesis(&format!("-run map_ffram: -json {netlist}"))
     )
