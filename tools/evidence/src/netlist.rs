@@ -10,8 +10,7 @@ mod refusals;
 
 use crate::formal;
 use anyhow::{Context, Result, ensure};
-use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -212,24 +211,28 @@ impl Mapped {
         let mut netlist: Value = serde_json::from_str(&text).context("yosys' netlist is not JSON")?;
         let modules = netlist["modules"].as_object_mut().context("the netlist has no modules")?;
         modules.retain(|_, module| module["attributes"].get("blackbox").is_none());
-        let mut counts = BTreeMap::new();
         for module in modules.values_mut() {
             let cells = module["cells"].as_object_mut().context("a module has no cells")?;
             cells.retain(|_, cell| cell["type"] != "$scopeinfo");
-            for kind in cells.values().filter_map(|cell| cell["type"].as_str()) {
-                *counts.entry(kind.to_owned()).or_insert(0) += 1;
-            }
             if !with_names {
                 module["netnames"] = json!({});
             }
         }
         let Cells { luts, flip_flops, multipliers, block_rams, .. } = self.core.family.cells;
         let kinds = [luts, flip_flops, multipliers, block_rams].into_iter().flatten();
+        let top = &self.core.design.top;
         let words: Vec<String> =
-            kinds.map(|(kind, _)| format!("{} {kind}", counts.get(*kind).unwrap_or(&0))).collect();
+            kinds.map(|(kind, _)| format!("{} {kind}", count(modules, top, kind))).collect();
         fs::write(self.folder.join("top.json"), json!({ "creator": "", "modules": modules }).to_string())?;
         Ok(words.join(", "))
     }
+}
+
+/// Cells of a type in a module, with those in the modules within it.
+fn count(modules: &Map<String, Value>, module: &str, kind: &str) -> usize {
+    let cells = modules.get(module).and_then(|module| module["cells"].as_object());
+    let types = cells.into_iter().flatten().filter_map(|(_, cell)| cell["type"].as_str());
+    types.map(|name| if name == kind { 1 } else { count(modules, name, kind) }).sum()
 }
 
 /// Maps a machine's core, and runs the mapped netlist in lockstep with random programs and the tracking program.
