@@ -21,8 +21,9 @@ MODULES["takt_ecc_code"] = FORMAL.parent / "ecc"
 PHASES = [(1250, 0, 0), (60, 1, 7), (65535, 1023, 1023), (1250, 25, 50)]
 # Filter, dead time, level while tripped, direct or not; mutants are tried with the last two.
 TRIPS = [(0, 2, 1, 0), (1, 0, 0, 0), (0, 0, 2, 1), (5, 3, 2, 0), (0, 3, 1, 1)]
-# Bits of a word: of a program with no bit left out, of data; mutants are tried with the last. A shorter word is one whose other bits are 0.
-CODES = [(48, 8), (32, 7)]  # bits of a word of program and of data, check bits
+# Bits of a word and check bits: of a program with no bit left out, of data; mutants are tried with the last. A shorter word is one whose other
+# bits are 0.
+CODES = [(48, 8), (32, 7)]
 # Statement of each proof, for people.
 SHOWN = {
     "phase": "two switches of a half bridge are never on together, dead time and least times hold",
