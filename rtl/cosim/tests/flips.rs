@@ -334,7 +334,7 @@ fn run_coded(case: &Case, model: &FlipModel, first: u64, flips: u64, bits: usize
         let word = random.next_u32() % own.words;
         let one = random.next_u32() % own.bits;
         let other = (one + 1 + random.next_u32() % (own.bits - 1)) % own.bits;
-        let flipped: Vec<(usize, u32)> =
+        let flipped: Vec<Bit> =
             [one, other].iter().take(bits).map(|bit| (*register, word * own.bits + bit)).collect();
         let cycle = begin + random.next_u32() % (end - begin);
         let outcome = simulation.flip(&flipped, cycle).unwrap_or_else(|error| panic!("{error}"));

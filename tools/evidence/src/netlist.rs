@@ -273,8 +273,8 @@ fn prove(arguments: &Arguments, is_recorded: bool) -> Result<()> {
     let core = Core::of(&arguments.machine, safety)?;
     let family = core.family.text;
     let equality = core.models.equality.with_context(|| format!("no proof is stated for {family}"))?;
-    let name = core.name.clone();
     let mapped = core.map(Venv::with(&[YOSYS, SAT])?)?;
+    let name = &mapped.core.name;
     let cells = mapped.reduce(true)?;
     let top = &mapped.core.design.top;
     let memories = (equality.memories)(top);
@@ -289,7 +289,7 @@ fn prove(arguments: &Arguments, is_recorded: bool) -> Result<()> {
         mapped.back(equality.cut) + &gates(top, "gates.json"),
     )?;
     println!("{name}: mapped to the cells of {family}: {cells}");
-    let mut command = python(&mapped.venv, &mapped.folder, &name)?;
+    let mut command = python(&mapped.venv, &mapped.folder, name)?;
     command.args(["--mutants", &arguments.mutants.to_string()]);
     command.args(is_recorded.then_some("--record")).args(arguments.verbose.then_some("--verbose"));
     // The campaign `flips` flips the flip-flops of the netlist.
