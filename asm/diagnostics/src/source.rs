@@ -118,6 +118,15 @@ impl Sources {
         Some(self.files.len() - 1)
     }
 
+    /// Renames the files for which `name` knows another name.
+    pub fn rename(&mut self, name: impl Fn(&str) -> Option<String>) {
+        for file in &mut self.files {
+            if let Some(name) = name(&file.name) {
+                file.name = name.into();
+            }
+        }
+    }
+
     /// The files, in the order in which they were read.
     pub fn files(&self) -> &[Source] {
         &self.files

@@ -54,6 +54,31 @@ fn every_assembling_command_searches_folders_and_library() {
     }
 }
 
+/// Messages name a program's files by the paths that open them: errors, warnings and faults, of a program and of a system's core.
+#[test]
+fn messages_name_files_by_paths_that_open_them() {
+    const TABLE: &str = ".input i:int\n.output y\n.reg unused\n.once\n wait loop\n.period\nloop: ld y, table[i]\n wait loop\n.data\ntable: .float 1.0\n";
+    const SYSTEM: &str = "tick = 100\n[[core]]\nname = \"c\"\nprogram = \"table.s\"\nmachine = \"t3\"\n[[wire]]\nfrom = \"host.i\"\nto = \"c.i\"\n[[wire]]\nfrom = \"c.y\"\nto = \"host.y\"\n";
+    let folder = project();
+    folder.write("app/part.s", " fad y, y, y\n");
+    folder.write("lib/bad.s", ".none\n");
+    folder.write("app/wrong.s", ".include \"part.s\"\n.include \"bad.s\"\n.reg 9\n");
+    folder.write("app/table.s", TABLE);
+    folder.write("app/core.toml", SYSTEM);
+    folder.write("i.csv", "i\n99999\n");
+    for (line, places) in [
+        ("asm app/wrong.s -I lib", &["app/part.s:1:2", "./lib/bad.s:1:1", "app/wrong.s:3:6"][..]),
+        ("run app/table.s --inputs i.csv", &["app/table.s:3:6", "app/table.s:7:1"]),
+        ("run app/core.toml --inputs i.csv", &["app/table.s:3:6", "app/table.s:7:1"]),
+        ("run app/main.s --inputs in.csv", &["app/main.s:1:10"]),
+    ] {
+        let text = folder.line(line).stderr;
+        for place in places {
+            assert!(text.contains(&format!("┌─ {place}\n")), "{line}: {place} in {text}");
+        }
+    }
+}
+
 #[test]
 fn the_debugger_shows_the_text_of_library_and_folder() {
     let folder = project();

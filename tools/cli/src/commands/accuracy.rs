@@ -9,7 +9,7 @@ mod lost;
 mod measurement;
 
 use crate::run::application::Application;
-use crate::run::load::{Load, is_system};
+use crate::run::load::{Load, folder_of, is_system};
 use crate::run::loaded_program::LoadedProgram;
 use crate::run::system::observers::Observer;
 use crate::run::system::run::SystemRun;
@@ -128,7 +128,8 @@ fn with_reals(arguments: &Accuracy, color: bool) -> Result<(Application, Reals)>
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let assembled = load.finish(load.assemble(&arguments.file, Load::source(&arguments.file)?))?;
     let reals = Reals { inputs: false, constants: assembled.reals.clone() };
-    Ok((Application::Program(Box::new(LoadedProgram::from(assembled))), reals))
+    let loaded = LoadedProgram { folder: folder_of(&arguments.file), ..LoadedProgram::from(assembled) };
+    Ok((Application::Program(Box::new(loaded)), reals))
 }
 
 /// Progress of an enclosure, which takes half a minute for a program of many branches.

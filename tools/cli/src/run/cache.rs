@@ -6,6 +6,7 @@
 
 use crate::run::loaded_program::LoadedProgram;
 use crate::run::spills::spilled;
+use std::path::PathBuf;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 use takt_asm::diag::Diagnostics;
@@ -98,7 +99,8 @@ fn read(place: &CacheLocation, machine: &'static Machine) -> Option<CacheEntry> 
     }
     let DebugInfo { sources, constants, names } = debug?;
     let spare = spare.into_iter().map(|(address, above)| (BundleAddress::new(address), above)).collect();
-    Some(CacheEntry { loaded: LoadedProgram { program, constants, sources, names, spilled }, spare })
+    let loaded = LoadedProgram { program, constants, sources, folder: PathBuf::new(), names, spilled };
+    Some(CacheEntry { loaded, spare })
 }
 
 fn write(place: &CacheLocation, kept: &CacheEntry, debug: &DebugInfo, spilled: &[String]) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Fault messages in the form of a mistake in the source.
 
+use crate::run::load::in_folder;
 use crate::run::loaded_program::LoadedProgram;
 use crate::terminal::output::Failure;
 use takt_debug::fault::diagnose;
@@ -22,7 +23,7 @@ pub(crate) fn located_error(error: anyhow::Error, loaded: &LoadedProgram, color:
 
 /// Renders a fault with its source line.
 pub(crate) fn rendered(fault: &Fault, loaded: &LoadedProgram, note: &str, color: bool) -> String {
-    let mut diagnostics = diagnose(fault, &loaded.program, &loaded.sources);
+    let mut diagnostics = in_folder(&loaded.folder, diagnose(fault, &loaded.program, &loaded.sources));
     for diagnostic in &mut diagnostics.list {
         diagnostic.notes.extend(Some(note.to_owned()).filter(|note| !note.is_empty()));
         if let (FaultKind::CycleLimit { .. }, Some(help)) = (&fault.kind, &mut diagnostic.help) {

@@ -9,6 +9,7 @@ use crate::terminal::output::{Failure, message};
 use crate::terminal::progress::DelayedActivity;
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use takt_asm::diag::Diagnostics;
 use takt_asm::limits::IMAGE_BYTES;
 use takt_asm::names::DebugInfo;
@@ -36,6 +37,20 @@ pub(crate) struct Load {
 /// The file describes a system instead of a program: in every command, its name ends in `.toml`.
 pub(crate) fn is_system(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+/// Folder of a file; empty for the working directory.
+pub(crate) fn folder_of(path: &Path) -> PathBuf {
+    path.parent().map_or(PathBuf::new(), Path::to_owned)
+}
+
+/// Diagnostics in which sources of a folder have paths that open them.
+pub(crate) fn in_folder(folder: &Path, mut diagnostics: Diagnostics) -> Diagnostics {
+    Arc::make_mut(&mut diagnostics.sources).rename(|name| {
+        let path = folder.join(name);
+        path.is_file().then(|| path.display().to_string())
+    });
+    diagnostics
 }
 
 impl Load {
@@ -103,11 +118,13 @@ impl Load {
             let (program, debug) =
                 image::read_with(&bytes).with_context(|| format!("{name} is not an image that can run"))?;
             let DebugInfo { sources, constants, names } = debug.unwrap_or_default();
-            LoadedProgram { program, constants, sources, names, spilled: Vec::new() }
+            let folder = PathBuf::new();
+            LoadedProgram { program, constants, sources, folder, names, spilled: Vec::new() }
         } else {
             Load::may_be_source(path, &bytes)?;
             let kept = self.assembled_program(path, bytes, false);
-            kept.map_err(|mistakes| Failure::Diagnostics(mistakes.render(self.color)))?.loaded
+            let loaded = kept.map_err(|mistakes| Failure::Diagnostics(mistakes.render(self.color)))?.loaded;
+            LoadedProgram { folder: folder_of(path), ..loaded }
         };
         let program = &loaded.program;
         self.is_for(program, &name)?;
@@ -133,8 +150,8 @@ impl Load {
 
     /// Name of a source file, and a loader for its folder. Includes are searched there first, then as in [`Load::sources`].
     fn project(path: &Path) -> (String, FileLoader) {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let loader = FileLoader::new(folder.map_or(PathBuf::from("."), Path::to_owned));
+        let folder = Some(folder_of(path)).filter(|folder| !folder.as_os_str().is_empty());
+        let loader = FileLoader::new(folder.unwrap_or(PathBuf::from(".")));
         let name = match path.file_name() {
             Some(name) if !files::is_dash(path) => name.to_string_lossy().into_owned(),
             _ => "<stdin>".to_owned(),
@@ -146,7 +163,11 @@ impl Load {
     pub(crate) fn assemble(&self, path: &Path, bytes: Vec<u8>) -> Result<AssembledProgram, Diagnostics> {
         let (name, folder) = Load::project(path);
         let _waiting = DelayedActivity::new(format!("assembling {}", files::input_name(path)));
-        takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options())
+        let mut result = takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options());
+        if let Ok(assembled) = &mut result {
+            assembled.warnings = in_folder(&folder_of(path), assembled.warnings.clone());
+        }
+        result.map_err(|mistakes| in_folder(&folder_of(path), mistakes))
     }
 
     /// Assembles a source read from a file without scheduling; also returns the contractions.
@@ -157,7 +178,8 @@ impl Load {
     ) -> Result<(PlainProgram, Vec<Contraction>), Diagnostics> {
         let (name, folder) = Load::project(path);
         let loader = self.sources(First { name: name.clone(), bytes, others: folder });
-        let plain = takt_asm::plain::plain(&name, &loader, &self.options())?;
+        let plain = takt_asm::plain::plain(&name, &loader, &self.options());
+        let plain = plain.map_err(|mistakes| in_folder(&folder_of(path), mistakes))?;
         let checked = takt_asm::check(&name, &loader, &self.options());
         Ok((plain, checked.contractions().to_vec()))
     }
@@ -170,6 +192,7 @@ impl Load {
     ) -> Result<AssembledProgram, Diagnostics> {
         let (name, folder) = Load::project(path);
         takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options())
+            .map_err(|mistakes| in_folder(&folder_of(path), mistakes))
     }
 
     /// Names and texts of all files that a program on a machine consists of.
@@ -193,11 +216,12 @@ impl Load {
             (!is_quiet).then(|| DelayedActivity::new(format!("assembling {}", files::input_name(path))));
         let warn = |warnings: &Diagnostics| {
             if !is_quiet {
-                message(&warnings.render(self.color));
+                message(&in_folder(&folder_of(path), warnings.clone()).render(self.color));
             }
         };
         let first = First { name: name.clone(), bytes, others };
         cache::assembled(&name, &self.sources(first), &self.options(), warn)
+            .map_err(|mistakes| in_folder(&folder_of(path), mistakes))
     }
 
     /// Assembles a built-in program.

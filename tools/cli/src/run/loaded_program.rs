@@ -2,6 +2,7 @@
 //! A loaded program with its debug information.
 
 use crate::run::spills::spilled;
+use std::path::PathBuf;
 use takt_asm::AssembledProgram;
 use takt_asm::expr::Value;
 use takt_asm::names::{DebugInfo, Names};
@@ -14,6 +15,8 @@ pub(crate) struct LoadedProgram {
     pub(crate) constants: Vec<(String, Value)>,
     /// Source texts, keyed by the program's file names.
     pub(crate) sources: Vec<(String, String)>,
+    /// Folder of the sources, which their names do not have; empty for an image and for built-in programs.
+    pub(crate) folder: PathBuf,
     /// Meanings of names in the source.
     pub(crate) names: Names,
     /// Cost of spilled registers, as lines of text; empty for an image.
@@ -24,6 +27,13 @@ impl From<AssembledProgram> for LoadedProgram {
     fn from(assembled: AssembledProgram) -> LoadedProgram {
         let DebugInfo { sources, constants, names } = assembled.debug_info();
         let spilled = spilled(&assembled);
-        LoadedProgram { program: assembled.program, constants, sources, names, spilled }
+        LoadedProgram {
+            program: assembled.program,
+            constants,
+            sources,
+            folder: PathBuf::new(),
+            names,
+            spilled,
+        }
     }
 }

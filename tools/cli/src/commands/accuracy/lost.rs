@@ -4,6 +4,7 @@
 
 use super::comparison::{Compared, Comparison};
 use super::lines::location;
+use crate::run::load::in_folder;
 use crate::run::loaded_program::LoadedProgram;
 use crate::terminal::number::rounded;
 use std::collections::BTreeMap;
@@ -77,7 +78,8 @@ fn placed(mut diagnostic: Diagnostic, loaded: &LoadedProgram, word: u32) -> Diag
             Sources::default()
         }
     };
-    Diagnostics { sources: Arc::new(sources), list: vec![diagnostic], ..Diagnostics::default() }
+    let told = Diagnostics { sources: Arc::new(sources), list: vec![diagnostic], ..Diagnostics::default() };
+    in_folder(&loaded.folder, told)
 }
 
 /// Part of a statement that a word computes.

@@ -10,7 +10,7 @@ pub(crate) mod report;
 pub(crate) mod run;
 
 use crate::run::fault;
-use crate::run::load::Load;
+use crate::run::load::{Load, in_folder};
 use crate::run::loaded_program::LoadedProgram;
 use crate::terminal::files;
 use crate::terminal::options::SourceArguments;
@@ -68,8 +68,9 @@ fn warn(system: &LoadedSystem, source: &SourceArguments, color: bool) -> Result<
     let levels: Levels = source.warnings.iter().copied().collect();
     let reads = stale_reads::stale_reads(&system.description);
     let told = reads.iter().filter_map(|read| {
-        let sources = &system.programs[read.core].sources;
-        takt_debug::stale_reads::diagnose(read, &system.description, sources, &levels)
+        let LoadedProgram { sources, folder, .. } = &system.programs[read.core];
+        let told = takt_debug::stale_reads::diagnose(read, &system.description, sources, &levels)?;
+        Some(in_folder(folder, told))
     });
     let told: Vec<Diagnostics> = told.collect();
     let text: Vec<String> = told.iter().map(|diagnostics| diagnostics.render(color)).collect();
