@@ -56,6 +56,7 @@ fn a_session_is_recorded() {
 fn mistakes_on_the_command_line() {
     let folder = Folder::new();
     folder.write("a.robot", "mov 1\n");
+    folder.write("a.svg", "mov 1\n");
     folder.write("b.toml", "tick = 10\n");
     for (line, status, text) in [
         ("robot a.robot --faults flood@1", 2, "there is no fault `flood`"),
@@ -63,7 +64,7 @@ fn mistakes_on_the_command_line() {
         ("robot a.robot --faults corrupt@-1", 2, "is not a time"),
         ("robot --check", 2, "FILE"),
         ("robot none.robot", 1, "none.robot"),
-        ("robot a.robot --plot a.robot", 2, "--plot would overwrite"),
+        ("robot a.svg --plot a.svg", 2, "--plot would overwrite"),
         ("robot a.robot --record a.robot", 2, "--record would overwrite"),
     ] {
         let done = folder.line(line);

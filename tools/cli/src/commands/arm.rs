@@ -53,7 +53,7 @@ pub(crate) struct Arm {
     csv: Option<PathBuf>,
     /// Draw that square in space, as the joint angles bring the tool along it, and the angles over time, as SVG; `-` is
     /// standard output.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "SVG", value_parser = options::picture())]
     plot: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]

@@ -19,7 +19,7 @@ use crate::run::table_run::{TableApplication, Tables};
 use crate::run::trace::TraceArguments;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number;
-use crate::terminal::options::{OptionalMachine, SourceArguments};
+use crate::terminal::options::{self, OptionalMachine, SourceArguments};
 use crate::terminal::output::{self, Failure, message};
 use crate::terminal::plot::curves::Curves;
 use anyhow::{Context, Result, bail};
@@ -85,7 +85,7 @@ pub(crate) struct Run {
     plant: PlantArguments,
     /// Draw the columns of the table of --outputs over time, as SVG: the output ports; with --plant, the input ports and the plant's states,
     /// too. The input ports of --inputs are drawn as well.
-    #[arg(long, value_name = "SVG", conflicts_with = "batch", help_heading = RESULTS)]
+    #[arg(long, value_name = "SVG", value_parser = options::picture(), conflicts_with = "batch", help_heading = RESULTS)]
     plot: Option<PathBuf>,
     #[command(flatten, next_help_heading = RESULTS)]
     trace: TraceArguments,

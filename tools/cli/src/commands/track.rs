@@ -72,9 +72,9 @@ pub(crate) struct Track {
     /// inputs, which `takt cosim` reads too. `-` is standard output.
     #[arg(long, value_name = "FILE")]
     pub(crate) csv: Option<PathBuf>,
-    /// Draw the tool path, its deviations magnified, and the tracking error over time: as SVG, `-` being standard output; without FILE on
+    /// Draw the tool path, its deviations magnified, and the tracking error over time: as SVG, `-` being standard output; without a file on
     /// the terminal, above the tables.
-    #[arg(long, value_name = "FILE", num_args = 0..=1)]
+    #[arg(long, value_name = "SVG", value_parser = options::picture(), num_args = 0..=1)]
     plot: Option<Option<PathBuf>>,
     #[command(flatten)]
     pub(crate) robot: SpreadArguments,

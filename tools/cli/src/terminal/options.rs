@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Options shared by several commands, and suggestions for misspelt names.
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use takt_asm::Contract;
@@ -77,6 +78,16 @@ fn folder(path: &str) -> Result<PathBuf, String> {
         path if path.exists() => Err("it is a file, not a folder".to_owned()),
         _ => Err("there is no such folder".to_owned()),
     }
+}
+
+/// Parser of the file of a picture, for clap: every picture is an SVG, so that other endings are refused.
+pub(crate) fn picture() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| match path.extension() {
+        Some(ending) if !ending.eq_ignore_ascii_case("svg") => {
+            Err(format!("the picture is an SVG: write `{}`", path.with_extension("svg").display()))
+        }
+        _ => Ok(path),
+    })
 }
 
 /// Parses the name of a machine, for clap.

@@ -9,6 +9,7 @@ use crate::terminal::files::Out;
 #[cfg(unix)]
 use crate::terminal::files::{self, OptionPath};
 use crate::terminal::number;
+use crate::terminal::options;
 #[cfg(unix)]
 use crate::terminal::output;
 #[cfg(unix)]
@@ -73,7 +74,7 @@ pub(super) struct Sim {
     #[arg(long, value_name = "SIGNAL=PORT", requires = "plant")]
     connect: Vec<String>,
     /// With --plant: draw the table of --outputs over time as SVG.
-    #[arg(long, value_name = "SVG", requires = "plant")]
+    #[arg(long, value_name = "SVG", value_parser = options::picture(), requires = "plant")]
     plot: Option<PathBuf>,
     /// Put the hybrid robot behind the pins and drive it along a tool path, this command being the host at the UART: the tracking
     /// error through the pins beside that of `takt track`.

@@ -3,6 +3,7 @@
 
 use crate::terminal::files::{self, Out};
 use crate::terminal::number::{self, rounded};
+use crate::terminal::options;
 use crate::terminal::output::{message, note};
 use crate::terminal::plot::curves::Curves;
 use crate::terminal::plot::terminal::{Trace, traces};
@@ -58,8 +59,8 @@ pub(super) struct ScopeArguments {
     /// Write the samples as a waveform, with the trigger as a signal; with --wiring in nanoseconds, else in periods.
     #[arg(long, value_name = "VCD")]
     vcd: Option<PathBuf>,
-    /// Draw the samples: as SVG; without FILE on the terminal, which is done if there is no other output.
-    #[arg(long, value_name = "SVG", num_args = 0..=1)]
+    /// Draw the samples: as SVG; without a file on the terminal, which is done if there is no other output.
+    #[arg(long, value_name = "SVG", value_parser = options::picture(), num_args = 0..=1)]
     plot: Option<Option<PathBuf>>,
 }
 

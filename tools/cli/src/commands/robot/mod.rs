@@ -8,7 +8,7 @@ mod summary;
 use crate::run::system;
 use crate::terminal::files::{self, OptionPath, Out};
 use crate::terminal::interrupt;
-use crate::terminal::options::SourceArguments;
+use crate::terminal::options::{self, SourceArguments};
 use crate::terminal::output::{self, Failure};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -49,7 +49,7 @@ pub(crate) struct Robot {
     #[arg(long, value_name = "TOML")]
     system: Option<PathBuf>,
     /// Draw joint angles, velocities, tracking errors and the tool's path as SVG; `-` is standard output.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "SVG", value_parser = options::picture())]
     plot: Option<PathBuf>,
     /// Write what the host and the encoders say, a row for each base tick of 100 µs, as CSV for `takt run`, `cosim` and
     /// `debug` of the system; the line to the controller then takes one word a tick.
