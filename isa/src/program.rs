@@ -601,6 +601,15 @@ impl Program {
         self.nearest(Space::Code, address.get())
     }
 
+    /// Name of a section: `once` if it starts at reset, otherwise the label of its first bundle.
+    pub fn section_name(&self, once: bool, first: BundleAddress) -> String {
+        match self.nearest_label(first) {
+            _ if once => "once".to_owned(),
+            Some((label, 0)) => label.to_owned(),
+            _ => format!("bundle {first}"),
+        }
+    }
+
     /// Label of the array that a word of data memory belongs to: the last label at or before the word.
     pub fn data_array(&self, word: u32) -> Option<&str> {
         self.nearest(Space::Data, word).map(|(label, _)| label)

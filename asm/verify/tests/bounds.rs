@@ -31,6 +31,7 @@ fn certified(name: &str, program: &Program, bounds: &Bounds) -> (ProvedBounds, S
     let proved = check(program, text.as_bytes()).unwrap_or_else(|error| panic!("{name}: {error}"));
     assert_eq!(proved.sections.len(), bounds.sections.len(), "{name}");
     for (claim, section) in proved.sections.iter().zip(&bounds.sections) {
+        assert_eq!(claim.name, section.name, "{name}");
         let span = |span: Span| -> Cycles { (span.best, span.worst) };
         assert_eq!((claim.once, claim.address), (section.once, section.address.get()), "{name}");
         assert_eq!(claim.cycles.refilled, span(section.cycles), "{name}");
@@ -68,7 +69,7 @@ fn every_shipped_program_has_its_bounds_proved() {
         }
     }
     println!(
-        "{programs} programs, {sections} sections, {places} places, {bytes} bytes, at most {longest:?}; without a bound: {without:?}"
+        "{programs} pairs of program and machine, {sections} sections, {places} places, {bytes} bytes, at most {longest:?}; without a bound: {without:?}"
     );
     assert!(programs > 100 && without.len() < programs / 10, "{programs}: {without:?}");
 }
@@ -243,6 +244,15 @@ const CHANGES: &[(&str, Change, &str)] = &[
             true
         },
         "format",
+    ),
+    (
+        "a section with another's name",
+        |of| {
+            let name = of.sections[0].name.clone();
+            of.sections[0].name = std::mem::replace(&mut of.sections[1].name, name);
+            true
+        },
+        "is claimed to be",
     ),
     (
         "another machine",

@@ -281,7 +281,7 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices, logged: bool) ->
                 }
                 let Some(end) = end else { continue };
                 let section = sections.entry((!once, address)).or_insert_with(|| SectionBounds {
-                    name: name(program, once, address),
+                    name: program.section_name(once, address),
                     address,
                     location: program.location(address),
                     ends: Vec::new(),
@@ -308,14 +308,6 @@ fn bound_with(program: &Program, slice: Slice, prices: &Prices, logged: bool) ->
     let Explorer { steps, found, log, .. } = explorer;
     let bounds = Bounds { sections: sections.into_values().collect(), steps };
     Ok(Found { bounds, prices: found, proof: log.map(Log::proof) })
-}
-
-fn name(program: &Program, once: bool, address: BundleAddress) -> String {
-    match program.nearest_label(address) {
-        _ if once => "once".to_owned(),
-        Some((label, 0)) => label.to_owned(),
-        _ => format!("bundle {address}"),
-    }
 }
 
 /// Least and most cycles of a part of a path. The most is negative where iterations in it have a price above their cycles.

@@ -90,7 +90,7 @@ pub fn check(program: &Program, text: &[u8]) -> Result<ProvedBounds, Unproved> {
         spans.push(proved);
     }
     checker.part = "sections".to_owned();
-    claims(&sections, &spans).map_err(|failure| failure.of(&checker))?;
+    claims(program, &sections, &spans).map_err(|failure| failure.of(&checker))?;
     let lemmas = proofs.iter().flat_map(|proof| &proof.lemmas);
     let places = lemmas.clone().map(|lemma| match lemma {
         Lemma::Code { places, .. } => places.len(),

@@ -6,6 +6,7 @@ use super::{Checker, Failure, at, text};
 use crate::clock::InFlight;
 use std::collections::BTreeMap;
 use takt_isa::certificate::{Claim, Cycles, End, Proof, Times};
+use takt_isa::{BundleAddress, Program};
 
 /// Section: whether it starts at reset, and its first bundle.
 pub(super) type Key = (bool, u32);
@@ -169,8 +170,12 @@ impl Checker<'_> {
     }
 }
 
-/// Checks that claims contain the proved cycles of every section.
-pub(super) fn claims(claims: &[Claim], proofs: &[BTreeMap<Key, SectionSpans>]) -> Result<(), Failure> {
+/// Checks that claims have the sections' names and contain the proved cycles of every section.
+pub(super) fn claims(
+    program: &Program,
+    claims: &[Claim],
+    proofs: &[BTreeMap<Key, SectionSpans>],
+) -> Result<(), Failure> {
     let mut proved: BTreeMap<Key, (Spans, Spans)> = BTreeMap::new();
     for (key, spans) in proofs.iter().flatten() {
         let (end, published) = proved.entry(*key).or_default();
@@ -185,6 +190,11 @@ pub(super) fn claims(claims: &[Claim], proofs: &[BTreeMap<Key, SectionSpans>]) -
         let Some((end, published)) = proved.get(&key) else {
             return Err((claim.address, format!("section `{}` is not proved", claim.name)).into());
         };
+        let name = program.section_name(claim.once, BundleAddress::new(claim.address));
+        if claim.name != name {
+            let what = format!("the section `{name}` is claimed to be `{}`", claim.name);
+            return Err((claim.address, what).into());
+        }
         claimed.push(key);
         at(claim.address, contains(&claim.name, Some(claim.cycles), *end))?;
         at(claim.address, contains(&format!("{}, published", claim.name), claim.published, *published))?;

@@ -24,7 +24,7 @@ use takt_asm::limits::IMAGE_BYTES;
 use takt_asm::plain::PlainProgram;
 use takt_isa::certificate::Times;
 use takt_isa::program::Location;
-use takt_isa::text::visible;
+use takt_isa::text::one_line;
 use takt_isa::{MACHINES, Program};
 use takt_verify::bound::{self, ProvedBounds, Unproved};
 use takt_verify::{Difference, EquivalenceReport};
@@ -123,9 +123,9 @@ impl Verify {
         let text = files::read(certificate, usize::try_from(bound::MAX_BYTES).unwrap_or(usize::MAX))?;
         let result = bound::check(&program, &text);
         if self.json {
-            files::json(&bounds_json(&result), out)?;
+            files::json(&bounds_json(&result, &program), out)?;
         } else {
-            write_bounds(&result, out)?;
+            write_bounds(&result, &program, out)?;
         }
         if result.is_ok() { Ok(()) } else { Err(Failure::Reported.into()) }
     }
@@ -212,10 +212,17 @@ impl Verify {
     }
 }
 
-fn bounds_json(result: &Result<ProvedBounds, Unproved>) -> Value {
+/// Places of the promises that bounds rest on: `.loop_bound` of loops, which the emulator checks.
+fn promises(program: &Program) -> Vec<String> {
+    let place = |at| program.bundle_place(at).unwrap_or_else(|| format!("bundle {at}"));
+    program.loop_bounds.iter().map(|bound| place(bound.address)).collect()
+}
+
+fn bounds_json(result: &Result<ProvedBounds, Unproved>, program: &Program) -> Value {
     match result {
         Ok(ProvedBounds { sections, lemmas, places, bundles }) => json!({
             "proved": true,
+            "promises": promises(program),
             "sections": sections,
             "lemmas": lemmas,
             "places": places,
@@ -227,16 +234,22 @@ fn bounds_json(result: &Result<ProvedBounds, Unproved>) -> Value {
     }
 }
 
-fn write_bounds(result: &Result<ProvedBounds, Unproved>, out: &mut Out) -> Result<()> {
+fn write_bounds(result: &Result<ProvedBounds, Unproved>, program: &Program, out: &mut Out) -> Result<()> {
     let proved = match result {
         Ok(proved) => proved,
-        Err(reason) => return Ok(writeln!(out, "not proved: {reason}")?),
+        Err(reason) => return Ok(writeln!(out, "not proved: {}", one_line(&reason.to_string()))?),
     };
     let text = |(best, worst)| number::least_to_most(best, worst);
-    writeln!(out, "proved: these cycles hold on every path, for all inputs")?;
+    let promises = promises(program).join(", ");
+    let promised = if promises.is_empty() {
+        promises
+    } else {
+        format!(", if loops keep their `.loop_bound` ({promises})")
+    };
+    writeln!(out, "proved: these cycles hold on every path, for all inputs{}", one_line(&promised))?;
     for section in &proved.sections {
         let Times { refilled, in_time, missed } = section.cycles;
-        write!(out, "  {}: {}", visible(&section.name), text(refilled))?;
+        write!(out, "  {}: {}", one_line(&section.name), text(refilled))?;
         if let (Some(in_time), Some(missed)) = (in_time, missed) {
             write!(
                 out,
