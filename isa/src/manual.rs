@@ -158,12 +158,14 @@ pub fn entry_text(entry: &Entry) -> String {
 
 /// The memories of a machine, with the block RAMs that they take.
 pub fn memories_text(machine: &Machine) -> String {
+    memories_in(machine, machine.code_block_rams(&KBIT_18), machine.data_block_rams(&KBIT_18))
+}
+
+/// The memories of a machine, with the stated numbers of block RAMs of program and data memory.
+pub fn memories_in(machine: &Machine, program: u64, data: u64) -> String {
+    let Machine { code_depth, data_depth, .. } = machine;
     format!(
-        "{} bundles of program memory ({} block RAMs), {} words of data memory ({} block RAMs)",
-        machine.code_depth,
-        machine.code_block_rams(&KBIT_18),
-        machine.data_depth,
-        machine.data_block_rams(&KBIT_18)
+        "{code_depth} bundles of program memory ({program} block RAMs), {data_depth} words of data memory ({data} block RAMs)"
     )
 }
 

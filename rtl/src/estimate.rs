@@ -202,7 +202,7 @@ impl Estimator {
             parts,
             sources: sources as f64,
             slowest: 0.0,
-            block_rams: block_rams(&plan, &self.library, self.family.block_ram()),
+            block_rams: block_rams(&plan, &self.library, self.family.block_ram()).total(),
             multipliers: 0,
         };
         let mut add = |luts: u64, flip_flops: u64, multipliers: u64| {
@@ -257,7 +257,7 @@ impl Estimator {
             luts: cells * estimate.luts,
             flip_flops: cells * estimate.flip_flops,
             multipliers: u64::from(times) * estimate.multipliers,
-            block_rams: u64::from(times) * block_rams(&plan, &self.library, self.family.block_ram()),
+            block_rams: u64::from(times) * block_rams(&plan, &self.library, self.family.block_ram()).total(),
             ..estimate
         })
     }

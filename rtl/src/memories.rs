@@ -10,8 +10,26 @@ use takt_isa::memory::{BlockRam, Shape};
 const PROGRAM_CHECK_BITS: u64 = 8;
 const DATA_CHECK_BITS: u64 = 7;
 
+/// Block RAMs of a core, by use.
+#[derive(Clone, Copy, Debug)]
+pub struct BlockRams {
+    /// Program memory.
+    pub program: u64,
+    /// Data memory.
+    pub data: u64,
+    /// Copies of register banks and of input ports, and tables of units.
+    pub others: u64,
+}
+
+impl BlockRams {
+    /// Block RAMs of the whole core.
+    pub fn total(&self) -> u64 {
+        self.program + self.data + self.others
+    }
+}
+
 /// Block RAMs of a core.
-pub fn block_rams(plan: &Plan, library: &Library, block: &BlockRam) -> u64 {
+pub fn block_rams(plan: &Plan, library: &Library, block: &BlockRam) -> BlockRams {
     let machine = plan.machine;
     // Each operand has a copy of every bank.
     let banks = machine.banks().map(|bank| Shape { words: bank.depth.into(), bits: 32 });
@@ -19,11 +37,13 @@ pub fn block_rams(plan: &Plan, library: &Library, block: &BlockRam) -> u64 {
     let tables = plan.slots.iter().flat_map(|slot| &slot.circuits);
     let coded =
         |memory: Shape, check: u64| Shape { bits: memory.bits + if plan.ecc { check } else { 0 }, ..memory };
-    let program = machine.code_memories().map(|memory| coded(memory, PROGRAM_CHECK_BITS));
-    let words = program.chain([coded(machine.data_memory(), DATA_CHECK_BITS)]);
-    words.map(|memory| block.blocks(memory)).sum::<u64>()
-        + sources * banks.map(|bank| block.blocks(bank)).sum::<u64>()
-        + tables.flat_map(|circuit| tables_of(circuit, library)).map(|table| block.blocks(table)).sum::<u64>()
+    let program = machine.code_memories().map(|memory| block.blocks(coded(memory, PROGRAM_CHECK_BITS)));
+    let tables = tables.flat_map(|circuit| tables_of(circuit, library)).map(|table| block.blocks(table));
+    BlockRams {
+        program: program.sum(),
+        data: block.blocks(coded(machine.data_memory(), DATA_CHECK_BITS)),
+        others: sources * banks.map(|bank| block.blocks(bank)).sum::<u64>() + tables.sum::<u64>(),
+    }
 }
 
 /// Tables of a unit: memories of its files whose words these files state.
@@ -48,7 +68,7 @@ mod tests {
     fn counted(machine: &'static Machine) -> u64 {
         let library = Library::builtin();
         let plan = Plan::new(machine, &library).expect("every machine has a circuit");
-        block_rams(&plan, &library, REFERENCE.block_ram())
+        block_rams(&plan, &library, REFERENCE.block_ram()).total()
     }
 
     #[test]

@@ -104,13 +104,21 @@ fn latched_ports_come_from_the_program() {
 fn a_core_has_the_mechanisms_that_are_asked_for() {
     let folder = Folder::new();
     let text = folder.line("rtl -m t1 --ecc -o ecc").ok();
-    assert!(text.contains("the core is takt_t1.v") && text.ends_with("are 23, without 21\n"), "{text}");
+    assert!(text.contains("the core is takt_t1.v") && text.ends_with("are 23, without it 21\n"), "{text}");
+    assert!(text.contains("(7 block RAMs), 1024 words of data memory (3 block RAMs)"), "{text}");
     let core = folder.read_text("ecc/takt_t1.v");
     assert!(core.contains("output wire        upset") && core.contains("takt_ecc_scrub"), "{core}");
     let list = folder.read_text("ecc/takt_t1.f");
     assert!(list.contains("ecc/takt_ecc_program.v") && !list.contains("core/takt_program.v"), "{list}");
-    folder.line("rtl -m t1 --ecc --second-core 3 -o both").ok();
+    let text = folder.line("rtl -m t1 --ecc --second-core 3 -o both").ok();
+    assert!(text.contains("block RAMs of each core are 23"), "{text}");
     assert!(folder.read_text("both/takt_t1_pair.v").contains("upset"));
+    // Files of an earlier export are told.
+    let again = folder.line("rtl -m t1 -o both");
+    assert!(again.stderr.contains("not of this export, such as ecc/takt_ecc_code.v"), "{again:?}");
+    assert_eq!(folder.line("rtl -m t1 --second-core 3 -o other").stderr, "");
+    let refused = folder.line("rtl --second-core system.toml -o out");
+    assert!(refused.status == Some(2) && refused.stderr.contains("stand in its wiring"), "{refused:?}");
     let refused = folder.line("rtl system.toml --ecc -o out");
     assert!(refused.status == Some(2) && refused.stderr.contains("--ecc"), "{refused:?}");
 }

@@ -46,7 +46,7 @@ pub(super) fn check(
         // The export reports machines without a circuit.
         let Ok(plan) = Plan::new(machine, library) else { return Ok(None) };
         let plan = Plan { ecc: wiring.safety.ecc, ..plan };
-        cores += memories::block_rams(&plan, library, block);
+        cores += memories::block_rams(&plan, library, block).total();
     }
     // A second core has memories of its own.
     let times = 1 + u64::from(wiring.safety.second_core.is_some());

@@ -8,6 +8,7 @@ pub(crate) mod paths;
 #[cfg(feature = "board")]
 pub(crate) mod pins;
 
+use crate::commands::left_out;
 use crate::run::application::Application;
 use crate::terminal::files::{self, Out};
 use crate::terminal::number::{self, Time};
@@ -51,15 +52,12 @@ pub(crate) struct Bound {
     #[arg(long, requires = "deadline")]
     pub(crate) empty_fifos: bool,
     /// From an edge at a pin of a board to one at another: the cycles of each part of the way, with the peripherals of --wiring.
-    #[cfg(feature = "board")]
     #[arg(long, requires = "wiring")]
     pins: bool,
     /// With --pins: which peripherals are at which pins (docs/board.md).
-    #[cfg(feature = "board")]
     #[arg(long, value_name = "TOML", requires = "pins")]
     pub(crate) wiring: Option<PathBuf>,
     /// With --pins: the board, where the wiring does not name it.
-    #[cfg(feature = "board")]
     #[arg(long, value_name = "BOARD", requires = "pins")]
     board: Option<String>,
     /// Write a proof of the bounds of a program to this file, which `takt verify --bound` checks (docs/verify.md).
@@ -93,6 +91,9 @@ impl Verdict {
 }
 
 pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
+    if arguments.wiring.is_some() && !cfg!(feature = "board") {
+        return left_out::left_out("board");
+    }
     let writes: Vec<_> = arguments.certificate.iter().map(|path| ("--certificate", path.as_path())).collect();
     files::check(&[("FILE", &arguments.file)], &writes)?;
     let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;

@@ -10,6 +10,7 @@ mod result_cache;
 mod route;
 mod units;
 
+use crate::commands::left_out;
 use crate::run::cache::SELF;
 use crate::run::load::Load;
 use crate::run::workers::{WorkArguments, Workers};
@@ -79,17 +80,15 @@ pub(crate) struct Explore {
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Draw all rows that were tried (SVG).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "SVG", value_parser = options::picture())]
     svg: Option<PathBuf>,
     #[command(flatten)]
     source: SourceArguments,
     /// Place and route the N fastest machines of the front on an LFE5U-85F, or on the family of --device, minutes each (installs the tools,
     /// 400 MB, once).
-    #[cfg(feature = "board")]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=100))]
     route: Option<u8>,
     /// Seeds of place and route.
-    #[cfg(feature = "board")]
     #[arg(long, value_name = "N", default_value_t = 3, requires = "route", value_parser = clap::value_parser!(u32).range(1..=100))]
     seeds: u32,
     #[command(flatten)]
@@ -190,6 +189,9 @@ struct Search<'a> {
 }
 
 pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()> {
+    if arguments.route.is_some() && !cfg!(feature = "board") {
+        return left_out::left_out("board");
+    }
     let writes = [("--csv", &arguments.csv), ("--svg", &arguments.svg)];
     let writes: Vec<_> =
         writes.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();

@@ -15,7 +15,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_family::REFERENCE;
 use takt_isa::MACHINES;
-use takt_isa::manual::memories_text;
+use takt_isa::manual::memories_in;
 use takt_rtl::{Library, Plan, Safety, bench, export, memories};
 
 /// Write the circuit of a machine, or of a system: a complete Verilog design.
@@ -51,7 +51,7 @@ pub(crate) struct Rtl {
     /// Put a second core beside the first one, CYCLES later (1 to 16), whose outputs are compared with the first one's: the top is the pair
     /// (docs/safety.md).
     #[arg(long, value_name = "CYCLES", num_args = 0..=1, default_missing_value = "2", conflicts_with = "system",
-        value_parser = clap::value_parser!(u32).range(1..=16))]
+        value_parser = cycles_later)]
     second_core: Option<u32>,
     /// Correct one wrong bit of each word of program and data memory, detect wrong bytes of register banks, and repair all of them while the
     /// program waits (docs/safety.md).
@@ -68,6 +68,13 @@ Examples:
   takt rtl -o t1 --machine t1 --program prog.s --inputs in.csv   the small one, and what its test bench runs
   takt rtl system.toml -o system                 several cores and their links (docs/system.md)
   cd t1 && iverilog -g2005 -f takt_t1_bench.f -o bench && ./bench";
+
+/// Parses the cycles by which a second core is later, for clap.
+fn cycles_later(text: &str) -> Result<u32, String> {
+    text.parse().ok().filter(|cycles| (1..=16).contains(cycles)).ok_or_else(|| {
+        "expected cycles, 1 to 16; second cores of a system stand in its wiring (docs/safety.md)".to_owned()
+    })
+}
 
 /// Default number of periods, without `--inputs`.
 const PERIODS: u64 = 3;
@@ -118,15 +125,19 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
         return files::json(&json!({ "machine": machine.name, "top": design.top, "files": written }), out);
     }
     let folder = arguments.output.display();
-    let what = if arguments.second_core.is_some() { "pair of cores" } else { "core" };
+    let (what, each) = match arguments.second_core {
+        Some(_) => ("pair of cores", " of each core"),
+        None => ("core", ""),
+    };
     writeln!(out, "{} files in {folder}; the {what} is {}.v", written.len(), design.top)?;
-    writeln!(out, "memories: {}", memories_text(machine))?;
+    let rams = |plan: &Plan| memories::block_rams(plan, &Library::builtin(), REFERENCE.block_ram());
+    let with = rams(&design.plan);
+    writeln!(out, "memories{each}: {}", memories_in(machine, with.program, with.data))?;
     if arguments.ecc {
-        let rams = |plan: &Plan| memories::block_rams(plan, &Library::builtin(), REFERENCE.block_ram());
-        let plain = rams(&Plan { ecc: false, ..design.plan.clone() });
-        let text = "error correction: block RAMs of the whole core are";
-        writeln!(out, "{text} {}, without {plain}", rams(&design.plan))?;
+        let without = rams(&Plan { ecc: false, ..design.plan.clone() }).total();
+        writeln!(out, "error correction: block RAMs{each} are {}, without it {without}", with.total())?;
     }
+    tell_others(&arguments.output, &written);
     Ok(())
 }
 
@@ -146,7 +157,31 @@ fn of_system(arguments: &Rtl, file: &Path, color: bool, out: &mut Out) -> Result
     }
     let folder = arguments.output.display();
     writeln!(out, "{} files in {folder}; the system is {}.v", written.len(), design.top)?;
+    tell_others(&arguments.output, &written);
     Ok(())
+}
+
+/// Notes that circuits of an earlier export are in the folder.
+fn tell_others(folder: &Path, written: &[String]) {
+    let files = |folder: &Path| std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let all = files(folder).flat_map(|entry| {
+        let path = entry.path();
+        if path.is_dir() { files(&path).map(|entry| entry.path()).collect() } else { vec![path] }
+    });
+    let is_circuit = |path: &Path| path.extension().is_some_and(|ending| ending == "v" || ending == "f");
+    let other = |path: PathBuf| {
+        let name = path.strip_prefix(folder).ok()?.to_str()?.to_owned();
+        (is_circuit(&path) && !written.contains(&name)).then_some(name)
+    };
+    let mut others: Vec<String> = all.filter_map(other).collect();
+    others.sort_unstable();
+    if let [first, ..] = &others[..] {
+        let (count, folder) = (others.len(), folder.display());
+        let plural = if count == 1 { "is" } else { "are" };
+        output::note(&format!(
+            "{count} circuit files in {folder} {plural} not of this export, such as {first}"
+        ));
+    }
 }
 
 fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
