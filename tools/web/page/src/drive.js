@@ -104,7 +104,7 @@ export class Drive {
   drive() {
     if (this.idle) el("drove").textContent = "The drive begins as soon as the program is assembled.";
     return this.work(async () => {
-      if (!(await this.current())) return;
+      await this.current();
       const { base, sampleTime, plan } = this.robot;
       this.clear();
       this.robot.begin(base, sampleTime, plan);

@@ -736,10 +736,12 @@ const assemble = () => work(async () => {
 
 /** Assembles if the text has changed. */
 async function current() {
-  if (!state.stale && state.program?.assembled && !state.program.inputs_error) return true;
-  state.stale = false;
-  await begin();
-  return state.program.assembled && !state.program.inputs_error;
+  if (state.stale || !state.program?.assembled || state.program.inputs_error) {
+    state.stale = false;
+    await begin();
+  }
+  if (!state.program.assembled) throw new Error("The program has errors: correct them first.");
+  if (state.program.inputs_error) throw new Error("The inputs have an error: correct it first.");
 }
 
 async function run() {
@@ -804,7 +806,7 @@ async function setStops() {
 /** Sets a breakpoint on a line of the source, or removes it. */
 function toggleStop(line) {
   return work(async () => {
-    if (!(await current())) return;
+    await current();
     const known = state.breaks.filter((one) => one.file === state.name && one.line === line);
     const commands = known.length ? known.map(({ id }) => `delete ${id}`) : [`break ${state.name}:${line}`];
     for (const command of commands) {
@@ -834,7 +836,7 @@ async function showFile(name) {
 
 async function execute(line) {
   return work(async () => {
-    if (!(await current())) return;
+    await current();
     const { text: answer, view } = await machine.call("execute", { line });
     el("answer").textContent = answer;
     showView(view);
@@ -851,7 +853,7 @@ function step(command) {
 
 function draw() {
   return work(async () => {
-    if (!(await current())) return;
+    await current();
     const { program } = state;
     const { picture, period, cycles } = await machine.call("picture", { period: Math.max(0, Number(el("which").value) || 0) });
     if (program !== state.program) return;
@@ -1104,7 +1106,7 @@ async function start() {
   });
   for (const id of ["table", "tick", "periods"]) el(id).addEventListener("input", changed);
   el("fill").addEventListener("click", () => work(async () => {
-    if (!(await current())) return;
+    await current();
     const names = state.program.inputs.map((port) => port.name);
     if (!names.length) throw new Error("the program has no input port");
     const { run } = state, row = (_, i) => names.map((name) => (typeof run?.inputs[name]?.[i] === "number" ? binary32(run.inputs[name][i]) : run?.inputs[name]?.[i] ?? 0)).join(",");

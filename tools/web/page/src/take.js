@@ -9,7 +9,7 @@ export function taker({ machine, work, current, state, editor }) {
     document.getElementById("export").open = false;
     return work(async () => {
       if (what === "source") return save(state.name, editor.text, "text/plain");
-      if (!(await current())) return;
+      await current();
       if (what === "image") return save(`${stem()}.takt`, await machine.call("image"), "application/octet-stream");
       if (what === "listing") return save(`${stem()}.lst`, await machine.call("listing"), "text/plain");
       if (what === "verilog") {

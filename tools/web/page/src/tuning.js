@@ -78,6 +78,11 @@ export class Tuning {
     const least = number("Least value", low, "end"), most = number("Largest value", high, "end"), field = number("Value", value, "field");
     const formula = node("code", { className: "formula" });
     const element = node("div", { className: "constant", title: text ?? "" }, node("b", { textContent: name }), least, slider, most, field, node("small", { textContent: unit ?? "" }), formula);
+    /** Why the present value forbids an end. */
+    const beyond = ({ value }) => {
+      const [low, high] = [least, most].map((end) => Number(end.value)), now = Number(field.value);
+      return now < low || now > high ? `${name} is ${field.value}, ${now < low ? "below" : "above"} ${value}` : null;
+    };
     const row = { element, slider, least, most, field, formula, constant };
     const fit = () => {
       for (const end of [least, most]) end.style.width = `${end.value.length + 1}ch`;
@@ -92,14 +97,16 @@ export class Tuning {
       field.value = short(value);
       field.setCustomValidity("");
     };
-    field.addEventListener("input", () => field.setCustomValidity(""));
+    for (const input of [least, most, field]) input.addEventListener("input", () => input.setCustomValidity(""));
+    const refuse = (input, why, kept) => {
+      input.value = kept;
+      input.setCustomValidity(`${why}: ${input === field ? name : input.ariaLabel} stays ${kept}`);
+      input.reportValidity();
+    };
     for (const end of [least, most]) {
       end.addEventListener("change", () => {
-        if (!isNumber(end.value)) {
-          const { value, low, high } = row.constant, [from, to] = initial(value);
-          end.value = short(end === least ? low ?? from : high ?? to);
-        }
-        if (this.bounded) end.value = short(within(row.constant, Number(end.value)));
+        const why = this.refusal(row.constant, end.value.trim()) ?? beyond(end);
+        if (why) return refuse(end, why, end === least ? slider.min : slider.max);
         row.put(Number(field.value));
       });
     }
@@ -131,9 +138,7 @@ export class Tuning {
       const why = this.refusal(row.constant, field.value.trim());
       if (why) {
         row.put(row.constant.value);
-        field.setCustomValidity(`${why}: ${name} stays ${field.value}`);
-        field.reportValidity();
-        return;
+        return refuse(field, why, field.value);
       }
       this.start(row);
       row.put(Number(field.value));

@@ -735,6 +735,10 @@ test("a slider writes a constant, moves a trace, and leaves the trace before pal
   await field.press("Enter");
   await page.waitForFunction(() => /does not assemble/.test(document.getElementById("cycles").textContent));
   assert.ok(await page.isEnabled("#tuning fieldset"));
+  // A program with errors has no image: the page says so.
+  await page.click("#export summary");
+  await page.click("[data-export=image]");
+  await page.waitForFunction(() => /correct them first/.test(document.getElementById("notice").textContent));
   await page.click("#tuning button");
   await page.waitForFunction((text) => takt.text === text && !takt.state.stale && !document.body.classList.contains("stale"), text);
   assert.deepEqual(errors, []);
@@ -921,6 +925,17 @@ test("a parameter's slider moves a trace without another assembly, within its ra
   assert.deepEqual(await values(page, "y"), [2, 4, 6]);
   const row = page.locator("#parameters .constant", { hasText: "k" });
   assert.deepEqual(await row.locator(".end").evaluateAll((ends) => ends.map((end) => end.value)), ["0", "50"], "the range in the source");
+  for (const [place, text, why] of [
+    ["first", "5", "k is 2, below 5: Least value of k stays 0"],
+    ["last", "1.5", "k is 2, above 1.5: Largest value of k stays 50"],
+    ["last", "much", '"much" is not a number: Largest value of k stays 50'],
+    ["last", "51", "51 is above the largest value, 50: Largest value of k stays 50"],
+  ]) {
+    const end = row.locator(".end")[place]();
+    await end.fill(text);
+    await end.press("Enter");
+    assert.equal(await end.evaluate((one) => one.validationMessage), why);
+  }
   await row.locator(".field").fill("5");
   await row.locator(".field").press("Enter");
   await page.waitForFunction(() => !takt.state.stale && takt.state.run?.outputs.y[2] === 15);
