@@ -46,7 +46,7 @@ enum Task {
         #[arg(long)]
         check: bool,
     },
-    /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total;
+    /// Prove for every program, and any number of cycles, that the core keeps the rules of issue, and that its decoders are total;
     /// with --units, that the arithmetic units are correct for all operands.
     Formal(formal::Arguments),
     /// Try every operand of a function that `formal --units` has made of a unit.

@@ -106,8 +106,8 @@ pub(crate) fn tables() -> Result<String> {
             share(early, harmful, 3)
         );
     }
-    text += "\n| structure of the first core | flips | masked | silent | harmful | detected without a second core | with it | cycles from flip to detection: below 10, below 100, a period, later |\n\
-             |---|---|---|---|---|---|---|---|\n";
+    text += "\n| structure of the first core | flips | masked | silent | outputs safe without need | harmful | detected without a second core | with it | cycles from flip to detection: below 10, below 100, a period, later |\n\
+             |---|---|---|---|---|---|---|---|---|\n";
     for (name, words) in STRUCTURES {
         let full = if name == "comparison" { name.to_owned() } else { format!("first.{name}") };
         let counts = summed(&record, |_, structure| structure == full);
@@ -116,10 +116,11 @@ pub(crate) fn tables() -> Result<String> {
             .map(|name| counts.of(name).to_string());
         let _ = writeln!(
             text,
-            "| {words} | {} | {} | {} | {harmful} | {} | {} | {} |",
+            "| {words} | {} | {} | {} | {} | {harmful} | {} | {} | {} |",
             counts.of("flips"),
             counts.of("masked"),
             counts.of("silent"),
+            counts.of("told") - counts.of("harmful_told"),
             share(counts.of("harmful_stopped"), harmful, 0),
             share(counts.of("harmful_told"), harmful, 1),
             told.join(", ")
