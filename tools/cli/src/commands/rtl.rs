@@ -176,11 +176,12 @@ fn tell_others(folder: &Path, written: &[String]) {
     let mut others: Vec<String> = all.filter_map(other).collect();
     others.sort_unstable();
     if let [first, ..] = &others[..] {
-        let (count, folder) = (others.len(), folder.display());
-        let plural = if count == 1 { "is" } else { "are" };
-        output::note(&format!(
-            "{count} circuit files in {folder} {plural} not of this export, such as {first}"
-        ));
+        let folder = folder.display();
+        let text = match others.len() {
+            1 => format!("a circuit file in {folder} is not of this export: {first}"),
+            count => format!("{count} circuit files in {folder} are not of this export, such as {first}"),
+        };
+        output::note(&text);
     }
 }
 
