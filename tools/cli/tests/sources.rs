@@ -70,7 +70,7 @@ fn messages_name_files_by_paths_that_open_them() {
         ("asm app/wrong.s -I lib", &["app/part.s:1:2", "./lib/bad.s:1:1", "app/wrong.s:3:6"][..]),
         ("run app/table.s --inputs i.csv", &["app/table.s:3:6", "app/table.s:7:1"]),
         ("run app/core.toml --inputs i.csv", &["app/table.s:3:6", "app/table.s:7:1"]),
-        ("run app/main.s --inputs in.csv", &["app/main.s:1:10"]),
+        ("run app/main.s --inputs in.csv", &["app/main.s:1:1"]),
     ] {
         let text = folder.line(line).stderr;
         for place in places {
