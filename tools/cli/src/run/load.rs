@@ -53,6 +53,12 @@ pub(crate) fn in_folder(folder: &Path, mut diagnostics: Diagnostics) -> Diagnost
     diagnostics
 }
 
+/// Gives diagnostics of the program in a file the paths of [`in_folder`].
+fn in_folder_of(path: &Path) -> impl Fn(Diagnostics) -> Diagnostics {
+    let folder = folder_of(path);
+    move |diagnostics| in_folder(&folder, diagnostics)
+}
+
 impl Load {
     /// Default options: the scheduler settings are those of the source.
     pub(crate) fn new(machine: impl Into<Option<&'static Machine>>, color: bool) -> Load {
@@ -163,11 +169,11 @@ impl Load {
     pub(crate) fn assemble(&self, path: &Path, bytes: Vec<u8>) -> Result<AssembledProgram, Diagnostics> {
         let (name, folder) = Load::project(path);
         let _waiting = DelayedActivity::new(format!("assembling {}", files::input_name(path)));
-        let mut result = takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options());
-        if let Ok(assembled) = &mut result {
-            assembled.warnings = in_folder(&folder_of(path), assembled.warnings.clone());
-        }
-        result.map_err(|mistakes| in_folder(&folder_of(path), mistakes))
+        let located = in_folder_of(path);
+        let result = takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options());
+        let mut assembled = result.map_err(&located)?;
+        assembled.warnings = located(assembled.warnings);
+        Ok(assembled)
     }
 
     /// Assembles a source read from a file without scheduling; also returns the contractions.
@@ -178,8 +184,7 @@ impl Load {
     ) -> Result<(PlainProgram, Vec<Contraction>), Diagnostics> {
         let (name, folder) = Load::project(path);
         let loader = self.sources(First { name: name.clone(), bytes, others: folder });
-        let plain = takt_asm::plain::plain(&name, &loader, &self.options());
-        let plain = plain.map_err(|mistakes| in_folder(&folder_of(path), mistakes))?;
+        let plain = takt_asm::plain::plain(&name, &loader, &self.options()).map_err(in_folder_of(path))?;
         let checked = takt_asm::check(&name, &loader, &self.options());
         Ok((plain, checked.contractions().to_vec()))
     }
@@ -192,7 +197,7 @@ impl Load {
     ) -> Result<AssembledProgram, Diagnostics> {
         let (name, folder) = Load::project(path);
         takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options())
-            .map_err(|mistakes| in_folder(&folder_of(path), mistakes))
+            .map_err(in_folder_of(path))
     }
 
     /// Names and texts of all files that a program on a machine consists of.
@@ -216,12 +221,11 @@ impl Load {
             (!is_quiet).then(|| DelayedActivity::new(format!("assembling {}", files::input_name(path))));
         let warn = |warnings: &Diagnostics| {
             if !is_quiet {
-                message(&in_folder(&folder_of(path), warnings.clone()).render(self.color));
+                message(&in_folder_of(path)(warnings.clone()).render(self.color));
             }
         };
         let first = First { name: name.clone(), bytes, others };
-        cache::assembled(&name, &self.sources(first), &self.options(), warn)
-            .map_err(|mistakes| in_folder(&folder_of(path), mistakes))
+        cache::assembled(&name, &self.sources(first), &self.options(), warn).map_err(in_folder_of(path))
     }
 
     /// Assembles a built-in program.

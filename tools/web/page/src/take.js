@@ -15,7 +15,7 @@ export function taker({ machine, work, current, state, editor }) {
       if (what === "verilog") {
         const { top, files } = await machine.call("verilog");
         const zipped = zipSync(Object.fromEntries(files.map((file) => [`${top}/${file.name}`, strToU8(file.text)])));
-        return save(`${state.name.replace(/\.(s|tks)$/, "")}-${top}.zip`, zipped, "application/zip");
+        return save(`${stem()}-${top}.zip`, zipped, "application/zip");
       }
       const ending = { c: ".h", rust: ".rs", json: ".json", svd: ".svd" }[what];
       return save(stem() + ending, await machine.call("header", { language: what }), "text/plain");
